@@ -1,0 +1,1 @@
+"""Dataflow files that come with placegraph."""

@@ -1,0 +1,79 @@
+"""The task interfaces that every model family reads its export into.
+
+A family module exports `FAMILY`: a class built with a `Weights` (see manifest.py) that implements one or more of these.
+Images are (H, W, 3) uint8 sRGB; boxes are (N, 4) float32 x_min y_min x_max y_max in px of that image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+U8 = NDArray[np.uint8]
+F32 = NDArray[np.float32]
+Masks = list[NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class ScoredNames:
+    """Names of an image, best first, with scores (N,) in 0..1."""
+
+    names: tuple[str, ...]
+    scores: F32
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """Named boxes (N, 4) in px, best first, with scores (N,) in 0..1."""
+
+    names: tuple[str, ...]
+    boxes_px: F32
+    scores: F32
+
+
+@dataclass(frozen=True)
+class Instances:
+    """Named boxes with a mask each, (H, W) bool of the whole image."""
+
+    boxes: Boxes
+    masks: Masks
+
+
+@runtime_checkable
+class Tagger(Protocol):
+    """Image to names."""
+
+    def tag(self, image: U8) -> ScoredNames:
+        """Names of what the image shows."""
+        ...
+
+
+@runtime_checkable
+class Detector(Protocol):
+    """Image and the names to look for to boxes; a fixed-class family ignores the names."""
+
+    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+        """Boxes of what was found."""
+        ...
+
+
+@runtime_checkable
+class Segmenter(Protocol):
+    """Image (and aligned depth in metres, (H, W) float32, 0 = none) and boxes to one mask a box."""
+
+    def segment(self, image: U8, depth_m: F32, boxes_px: F32) -> Masks:
+        """One (H, W) bool mask for each box, in order; an empty mask where nothing was found."""
+        ...
+
+
+@runtime_checkable
+class InstanceSegmenter(Protocol):
+    """Image to boxes and masks in one pass."""
+
+    def instances(self, image: U8, names: Sequence[str]) -> Instances:
+        """Boxes of what was found, each with its mask."""
+        ...

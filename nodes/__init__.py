@@ -1,0 +1,1 @@
+"""One module per node; each exports NODE."""

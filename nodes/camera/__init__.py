@@ -1,0 +1,1 @@
+"""Sources of frames: one module per device or data set format, each exporting SOURCE."""

@@ -1,0 +1,1 @@
+"""One relation per module, each exporting RELATION."""

@@ -1,0 +1,291 @@
+"""Every message that travels between nodes.
+
+The declaration is the contract: each array field states dtype, shape, unit and frame. `check` (called by the codec on
+both sides) verifies dtypes and shapes; a letter that appears twice in one message must stand for the same size.
+Ragged data is packed as values and offsets: item i is `values[offsets[i]:offsets[i + 1]]`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import typing
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.runtime.errors import SchemaError
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+I64 = NDArray[np.int64]
+U8 = NDArray[np.uint8]
+U16 = NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class ArraySpec:
+    """What one array field must be."""
+
+    dtype: str
+    shape: tuple[str | int, ...]
+    unit: str
+    frame: str
+
+    def declaration(self) -> str:
+        """Stable text that enters the message's checksum."""
+        return f"{self.dtype}{list(self.shape)}{self.unit}@{self.frame}"
+
+
+def array(dtype: str, shape: tuple[str | int, ...], *, unit: str, frame: str = "") -> Any:
+    """Declare an array field: `shape` holds fixed sizes and letters, `unit` and `frame` enter its checksum."""
+    return dataclasses.field(metadata={"array": ArraySpec(dtype, shape, unit, frame)})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Message:
+    """Base of all messages: the frame it belongs to (-1: none) and that frame's capture time."""
+
+    frame_id: int
+    stamp_ns: int
+
+    @classmethod
+    @cache
+    def array_specs(cls) -> dict[str, ArraySpec]:
+        """Array fields by name, in declaration order."""
+        return {f.name: f.metadata["array"] for f in dataclasses.fields(cls) if "array" in f.metadata}
+
+    @classmethod
+    @cache
+    def scalar_types(cls) -> dict[str, Any]:
+        """Non-array fields by name with their types, in declaration order."""
+        hints = typing.get_type_hints(cls)
+        return {f.name: hints[f.name] for f in dataclasses.fields(cls) if "array" not in f.metadata}
+
+    @classmethod
+    @cache
+    def checksum(cls) -> str:
+        """Eight hex digits of the declaration: equal on both sides of the bus or the message is refused."""
+        parts = [cls.__name__]
+        parts += [f"{name}:{spec.declaration()}" for name, spec in cls.array_specs().items()]
+        parts += [f"{name}:{kind}" for name, kind in cls.scalar_types().items()]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:8]
+
+    def check(self) -> None:
+        """Raise SchemaError unless every field is what the declaration says."""
+        sizes: dict[str, tuple[int, str]] = {}
+        for name, spec in self.array_specs().items():
+            value = getattr(self, name)
+            where = f"{type(self).__name__}.{name}"
+            if not isinstance(value, np.ndarray):
+                raise SchemaError(f"{where}: expected an array, got {type(value).__name__}")
+            if value.dtype != np.dtype(spec.dtype):
+                raise SchemaError(f"{where}: expected dtype {spec.dtype}, got {value.dtype}")
+            if value.ndim != len(spec.shape):
+                raise SchemaError(f"{where}: expected shape {spec.shape}, got {value.shape}")
+            for size, want in zip(value.shape, spec.shape, strict=True):
+                if isinstance(want, int):
+                    if size != want:
+                        raise SchemaError(f"{where}: expected shape {spec.shape}, got {value.shape}")
+                elif want.endswith("+1"):
+                    self._same_size(sizes, want[:-2], size - 1, where)
+                else:
+                    self._same_size(sizes, want, size, where)
+        for name, kind in self.scalar_types().items():
+            self._check_scalar(name, kind, sizes)
+
+    @staticmethod
+    def _same_size(sizes: dict[str, tuple[int, str]], letter: str, size: int, where: str) -> None:
+        known, first = sizes.setdefault(letter, (size, where))
+        if known != size:
+            raise SchemaError(f"{where}: size {letter} is {size} but {known} in {first}")
+
+    def _check_scalar(self, name: str, kind: Any, sizes: dict[str, tuple[int, str]]) -> None:
+        value, where = getattr(self, name), f"{type(self).__name__}.{name}"
+        if kind == tuple[str, ...]:
+            if not isinstance(value, tuple) or not all(isinstance(item, str) for item in value):
+                raise SchemaError(f"{where}: expected a tuple of strings")
+        elif type(value) is not kind:
+            raise SchemaError(f"{where}: expected {kind.__name__}, got {type(value).__name__}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frame(Message):
+    """One aligned colour and depth pair, as the camera gave it."""
+
+    color: U8 = array("uint8", ("H", "W", 3), unit="sRGB")
+    depth: U16 = array("uint16", ("H", "W"), unit="depth_unit_m", frame="camera")  # 0 = no reading
+    depth_unit_m: float  # metres per step of depth; integers keep recordings exact
+    intrinsics: F64 = array("float64", (4,), unit="px")  # fx fy cx cy
+    given_world_from_camera: F64 = array("float64", (4, 4), unit="m", frame="world")  # NaN: the source has no pose
+    up_camera: F64 = array("float64", (3,), unit="1", frame="camera")  # against gravity, unit length; NaN: unknown
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class End(Message):
+    """The source gives no further frame; `frame_id` is that of the last one, -1 if there was none."""
+
+    frames: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pose(Message):
+    """Where the camera was, and whether to believe it."""
+
+    world_from_camera: F64 = array("float64", (4, 4), unit="m", frame="world")
+    trusted: bool  # False: do not put this frame into the map
+    quality: float  # share of scan points with a map point nearby, 0..1
+    residual_m: float  # median distance of those points to the map; NaN when nothing was compared
+    innovation_m: float  # how far registration moved the pose from its prediction
+    reason: str  # why not trusted; "" when trusted
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Keyframe(Message):
+    """A frame worth perceiving, with its pose."""
+
+    color: U8 = array("uint8", ("H", "W", 3), unit="sRGB")
+    depth: U16 = array("uint16", ("H", "W"), unit="depth_unit_m", frame="camera")
+    depth_unit_m: float
+    intrinsics: F64 = array("float64", (4,), unit="px")
+    world_from_camera: F64 = array("float64", (4, 4), unit="m", frame="world")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LastKeyframe(Message):
+    """No further keyframe will come; `frame_id` is that of the last one, -1 if there was none."""
+
+    keyframes: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tags(Message):
+    """What the whole image shows, best first."""
+
+    names: tuple[str, ...]
+    scores: F32 = array("float32", ("N",), unit="1")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Detections(Message):
+    """Named boxes in the image."""
+
+    names: tuple[str, ...]
+    boxes_px: F32 = array("float32", ("N", 4), unit="px")  # x_min y_min x_max y_max
+    scores: F32 = array("float32", ("N",), unit="1")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Segments(Message):
+    """Named masks in the image; mask i covers the whole-pixel box i, packed row by row, eight pixels a byte."""
+
+    names: tuple[str, ...]
+    scores: F32 = array("float32", ("N",), unit="1")
+    boxes_px: I32 = array("int32", ("N", 4), unit="px")  # x_min y_min x_max y_max, max exclusive
+    mask_bits: U8 = array("uint8", ("B",), unit="bits")
+    mask_offsets: I64 = array("int64", ("N+1",), unit="bytes")
+
+    def masks(self) -> Iterator[NDArray[np.bool_]]:
+        """Each mask as bool of its box's size (y_max - y_min, x_max - x_min)."""
+        for i, (x0, y0, x1, y1) in enumerate(self.boxes_px.tolist()):
+            bits = self.mask_bits[self.mask_offsets[i] : self.mask_offsets[i + 1]]
+            count = (y1 - y0) * (x1 - x0)
+            yield np.unpackbits(bits, count=count).astype(bool).reshape(y1 - y0, x1 - x0)
+
+    @staticmethod
+    def pack(masks: list[NDArray[np.bool_]]) -> tuple[U8, I64]:
+        """Box-sized masks to (mask_bits, mask_offsets)."""
+        packed = [np.packbits(mask.ravel()) for mask in masks]
+        offsets = np.cumsum([0, *(len(bits) for bits in packed)], dtype=np.int64)
+        return (np.concatenate(packed) if packed else np.zeros(0, np.uint8)), offsets
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Map(Message):
+    """All that fusion knows, complete each time: the world's cloud, free space, and the objects."""
+
+    revision: int
+    final: bool  # the source ended and every keyframe is in
+    keyframes: int
+    voxel_m: float
+    points_world: F32 = array("float32", ("P", 3), unit="m", frame="world")
+    point_colors: U8 = array("uint8", ("P", 3), unit="sRGB")
+    free_cell_m: float
+    free_points_world: F32 = array("float32", ("F", 3), unit="m", frame="world")  # centres of cells seen through
+    camera_positions_world: F32 = array("float32", ("K", 3), unit="m", frame="world")
+    object_ids: I64 = array("int64", ("N",), unit="1")
+    object_boxes_world: F32 = array("float32", ("N", 2, 3), unit="m", frame="world")  # min, max
+    object_oriented_boxes: F32 = array("float32", ("N", 7), unit="m, rad", frame="world")  # centre, size, yaw about z
+    object_colors: U8 = array("uint8", ("N", 3), unit="sRGB")  # median over its points
+    object_observations: I64 = array("int64", ("N",), unit="1")
+    object_first_frames: I64 = array("int64", ("N",), unit="1")
+    object_last_frames: I64 = array("int64", ("N",), unit="1")
+    object_points_world: F32 = array("float32", ("Q", 3), unit="m", frame="world")
+    object_point_offsets: I64 = array("int64", ("N+1",), unit="1")
+    tag_names: tuple[str, ...]  # tags of object 0, then of object 1, ...; strongest first within an object
+    tag_votes: F32 = array("float32", ("T",), unit="1")  # summed detection scores over views
+    tag_offsets: I64 = array("int64", ("N+1",), unit="1")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Graph(Message):
+    """The scene graph, complete each time, as its canonical JSON (see scene_graph.py)."""
+
+    revision: int  # that of the Map it was built from
+    final: bool
+    named: bool  # rooms and locations carry the names found for this very revision
+    json: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlaceNames(Message):
+    """Names for rooms and locations of one graph revision."""
+
+    revision: int
+    final: bool
+    ids: tuple[str, ...]  # node id of each entry; a node may have several names, best first
+    names: tuple[str, ...]
+    weights: F32 = array("float32", ("N",), unit="1")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Question(Message):
+    """A request in plain words."""
+
+    question_id: str
+    text: str
+    k: int  # how many candidates to list
+    mode: str  # "program"
+    viewpoint_world: F64 = array("float64", (3,), unit="m", frame="world")  # the asker's position; NaN: not given
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer(Message):
+    """The reply to a question as canonical JSON (fields in README, "Asking")."""
+
+    question_id: str
+    json: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Health(Message):
+    """How one process is doing, once a second."""
+
+    node: str
+    steps: int
+    rate_hz: float  # steps in the last second
+    step_p50_ms: float
+    step_p95_ms: float
+    queue: int
+    drops: int
+    memory_mb: float
+
+
+def all_kinds() -> tuple[type[Message], ...]:
+    """Every message class of this module, by name."""
+    return tuple(sorted(Message.__subclasses__(), key=lambda kind: kind.__name__))

@@ -1,0 +1,1 @@
+"""`placegraph <name>`: one module per command."""

@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# The checks that CI runs: lint, format, types. PYTHON names the interpreter of an environment with the dev extra.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+PYTHON="${PYTHON:-python}"
+mkdir -p build/types/placegraph
+for folder in configs models_onnx nodes runtime tools; do  # type checkers cannot follow the mapped editable install
+    ln -sfn "../../../$folder" "build/types/placegraph/$folder"
+done
+"$PYTHON" -m ruff check --output-format=concise .
+"$PYTHON" -m ruff format --check .
+"$PYTHON" -m mypy build/types/placegraph/{configs,models_onnx,nodes,runtime,tools}
