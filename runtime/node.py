@@ -28,8 +28,8 @@ class Node:
     """
 
     config_type: ClassVar[type[NodeConfig]] = NodeConfig
-    takes: ClassVar[tuple[type[Message], ...]] = ()
-    gives: ClassVar[tuple[type[Message], ...]] = ()
+    takes: tuple[type[Message], ...] = ()  # on the class; set in __init__ only where it depends on settings
+    gives: tuple[type[Message], ...] = ()
     # Kinds taken from further down the dataflow. A giver does not wait for this node to take them, which is what keeps
     # a cycle from blocking; without these edges the dataflow has no cycle (checked when it is built).
     feedback: ClassVar[tuple[type[Message], ...]] = ()
@@ -53,8 +53,6 @@ class Node:
 
 class Source(Node):
     """A node that takes nothing and gives messages by itself: a camera, or a recording."""
-
-    lossless: ClassVar[bool | None] = None  # None: depends on the settings; see `is_lossless`
 
     def is_lossless(self) -> bool:
         """Whether every message must arrive (data sets, recordings) or the newest wins (a live camera)."""
