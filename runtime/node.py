@@ -8,10 +8,12 @@ import pkgutil
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Message
+
+NODES = "placegraph.nodes"
 
 
 class NodeConfig(BaseModel):
@@ -33,6 +35,8 @@ class Node:
     # Kinds taken from further down the dataflow. A giver does not wait for this node to take them, which is what keeps
     # a cycle from blocking; without these edges the dataflow has no cycle (checked when it is built).
     feedback: ClassVar[tuple[type[Message], ...]] = ()
+    optional: tuple[type[Message], ...] = ()  # kinds taken if some node gives them
+    restartable: ClassVar[bool] = False  # live: a crash loses nothing but the message in hand (no state to lose)
     # (question kind, answer kind): served as a queryable.
     serves: ClassVar[tuple[type[Message], type[Message]] | None] = None
 
@@ -100,3 +104,15 @@ def available(package: str) -> list[str]:
     spec = importlib.util.find_spec(package)
     paths: Iterable[str] = (spec.submodule_search_locations or ()) if spec else ()
     return sorted(module.name for module in pkgutil.iter_modules(paths) if not module.name.startswith("_"))
+
+
+def build_node(name: str, settings: dict[str, Any], context: Context) -> Node:
+    """Find a node by name and build it with checked settings; raises ConfigError `[nodes.<name>] key: what`."""
+    node_type: type[Node] = plugin(NODES, name, "NODE", "node")
+    try:
+        config = node_type.config_type.model_validate(settings)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise ConfigError(f"[nodes.{name}] {where}: {first['msg']}") from None
+    return node_type(config, context)

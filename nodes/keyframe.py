@@ -1,0 +1,105 @@
+"""Which frames are worth perceiving: a motion and time gate over trusted poses, bounded in flight when live."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from placegraph.runtime.geometry import rotation_angle_rad
+from placegraph.runtime.join import Join
+from placegraph.runtime.messages import End, Frame, Keyframe, LastKeyframe, Message, Pose, Segments
+from placegraph.runtime.node import Context, Node, NodeConfig
+
+
+class KeyframeConfig(NodeConfig):
+    """A frame is chosen when the camera moved, turned or waited enough since the last one."""
+
+    translation_m: float = Field(0.1, gt=0)  # DualMap's gate: 0.1 m ...
+    rotation_rad: float = Field(0.1, gt=0)  # departs: its 3 deg chooses nearly every frame of a hand-held camera
+    period_s: float = Field(1.0, gt=0)  # departs: its 0.5 s; a camera that stands still sees little that is new
+    in_flight: int = Field(4, ge=1)  # live: keyframes that perception may be behind
+
+
+class KeyframeNode(Node):
+    """Takes frames with their poses and gives the chosen ones.
+
+    In replay the choice depends on the poses alone, and the windows of the bus make the camera wait for slow models.
+    Live, a frame that comes while `in_flight` keyframes are unfinished is not chosen; Segments are the receipts.
+    """
+
+    config_type = KeyframeConfig
+    takes = (Frame, Pose, Segments, End)
+    gives = (Keyframe, LastKeyframe)
+    feedback = (Segments,)
+    restartable: ClassVar[bool] = True
+
+    def __init__(self, config: Any, context: Context) -> None:
+        super().__init__(config, context)
+        self._join = Join(Frame, Pose)
+        self._last: tuple[int, NDArray[np.float64]] | None = None  # stamp and pose of the last keyframe
+        self._in_flight: list[int] = []
+        self._chosen = 0
+        self._last_seen = -1
+        self._end: End | None = None
+
+    def step(self, message: Message) -> Sequence[Message]:
+        """Join frames with poses; choose; say when the last one is out."""
+        given: list[Message] = []
+        if isinstance(message, Segments):
+            # a receipt also stands for older keyframes: theirs were lost with a process that was started again
+            self._in_flight = [i for i in self._in_flight if i > message.frame_id]
+        elif isinstance(message, End):
+            self._end = message
+        elif (joined := self._join.add(message)) is not None:
+            frame, pose = joined
+            assert isinstance(frame, Frame) and isinstance(pose, Pose)
+            self._last_seen = frame.frame_id
+            if self._is_worth(frame, pose):
+                given.append(self._choose(frame, pose))
+        if self._end is not None and self._last_seen >= self._end.frame_id:
+            given.append(self._last_message(self._end))
+            self._end = None
+        return given
+
+    def _is_worth(self, frame: Frame, pose: Pose) -> bool:
+        if not pose.trusted:
+            return False
+        if not self.context.lossless and len(self._in_flight) >= self.config.in_flight:
+            return False
+        if self._last is None:
+            return True
+        stamp_ns, world_from_last = self._last
+        moved_m = float(np.linalg.norm(pose.world_from_camera[:3, 3] - world_from_last[:3, 3]))
+        turned_rad = rotation_angle_rad(world_from_last[:3, :3].T @ pose.world_from_camera[:3, :3])
+        waited_s = (frame.stamp_ns - stamp_ns) * 1e-9
+        return bool(
+            moved_m >= self.config.translation_m
+            or turned_rad >= self.config.rotation_rad
+            or waited_s >= self.config.period_s
+        )
+
+    def _choose(self, frame: Frame, pose: Pose) -> Keyframe:
+        self._last = (frame.stamp_ns, pose.world_from_camera)
+        self._chosen += 1
+        self._last_keyframe_id = frame.frame_id
+        self._in_flight.append(frame.frame_id)
+        return Keyframe(
+            frame_id=frame.frame_id,
+            stamp_ns=frame.stamp_ns,
+            color=frame.color,
+            depth=frame.depth,
+            depth_unit_m=frame.depth_unit_m,
+            intrinsics=frame.intrinsics,
+            world_from_camera=pose.world_from_camera,
+        )
+
+    def _last_message(self, end: End) -> LastKeyframe:
+        last_id = self._last_keyframe_id if self._chosen else -1
+        return LastKeyframe(frame_id=last_id, stamp_ns=end.stamp_ns, keyframes=self._chosen)
+
+
+NODE = KeyframeNode

@@ -1,0 +1,90 @@
+"""Depth to cloud, odometry in a world with z up, and a judgement whether to believe it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from placegraph.nodes.pose import gravity
+from placegraph.nodes.pose.odometry import Odometry, OdometryConfig
+from placegraph.runtime.geometry import backproject, is_rigid
+from placegraph.runtime.messages import End, Frame, Message, Pose
+from placegraph.runtime.node import Context, Node
+
+logger = logging.getLogger(__name__)
+F64 = NDArray[np.float64]
+
+
+class PoseConfig(OdometryConfig):
+    """What gives the pose, and the cloud it is made from."""
+
+    method: Literal["kiss_icp", "given"] = "kiss_icp"  # given: the poses that the source brings
+    stride: int = Field(4, ge=1)  # every 4th pixel each way: 19 k points of 640x480
+    gravity_frames: int = Field(10, ge=1)  # frames that decide which way is up, when the source does not know
+
+
+class PoseNode(Node):
+    """Gives one Pose for each Frame, in a world with z up; the first `gravity_frames` wait until up is known."""
+
+    config_type = PoseConfig
+    takes = (Frame, End)
+    gives = (Pose,)
+
+    def __init__(self, config: PoseConfig, context: Context) -> None:
+        super().__init__(config, context)
+        self._odometry = Odometry(config, context.threads)
+        self._waiting: list[tuple[Pose, F64, NDArray[np.float32]]] = []
+        self._world_from_start: F64 | None = None
+
+    def step(self, message: Message) -> Sequence[Message]:
+        """Estimate the pose of a frame."""
+        if isinstance(message, End):
+            return self._release()
+        assert isinstance(message, Frame)
+        depth_m = message.depth * np.float32(message.depth_unit_m)
+        points = backproject(depth_m, message.intrinsics, self.config.stride)
+        ranges = np.linalg.norm(points, axis=1)
+        points = points[(ranges > self.config.min_range_m) & (ranges < self.config.max_range_m)]
+        estimate = self._given(message) if self.config.method == "given" else self._odometry.register(points)
+        pose = Pose(frame_id=message.frame_id, stamp_ns=message.stamp_ns, **estimate)
+        if self._world_from_start is not None:
+            return [self._in_world(pose)]
+        self._waiting.append((pose, message.up_camera, points))
+        return self._release() if len(self._waiting) >= self.config.gravity_frames else []
+
+    def _given(self, frame: Frame) -> dict[str, Any]:
+        known = is_rigid(frame.given_world_from_camera)
+        return {
+            "world_from_camera": frame.given_world_from_camera if known else np.eye(4),
+            "trusted": known,
+            "quality": 1.0 if known else 0.0,
+            "residual_m": float("nan"),
+            "innovation_m": 0.0,
+            "reason": "" if known else "the source has no pose for this frame",
+        }
+
+    def _release(self) -> list[Message]:
+        """Decide which way is up from the frames so far and give their poses."""
+        waiting, self._waiting = self._waiting, []
+        if self._world_from_start is None and waiting:
+            trusted = [(pose.world_from_camera, up, points) for pose, up, points in waiting if pose.trusted]
+            found = gravity.find_up(trusted, self.config.seed)
+            logger.info("up is %s in the start frame, from %s", np.round(found.up, 3).tolist(), found.source)
+            if not found.reliable:
+                logger.warning("no way to tell which way is up: the map may be tilted")
+            self._world_from_start = gravity.level(found.up)
+        return [self._in_world(pose) for pose, _, _ in waiting]
+
+    def _in_world(self, pose: Pose) -> Pose:
+        assert self._world_from_start is not None
+        fields = {name: getattr(pose, name) for name in (*Pose.array_specs(), *Pose.scalar_types())}
+        fields["world_from_camera"] = self._world_from_start @ pose.world_from_camera
+        return Pose(**fields)
+
+
+NODE = PoseNode

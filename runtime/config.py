@@ -1,0 +1,148 @@
+"""Read a dataflow file, build the nodes, check the wiring."""
+
+from __future__ import annotations
+
+import graphlib
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from placegraph.runtime.bus import BusConfig
+from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.messages import Health, Message, Question
+from placegraph.runtime.node import Context, Node, Source, build_node
+
+# Given by the shells themselves, not by a node: requests from outside, and every process's own report.
+GIVEN_BY_SHELL: tuple[type[Message], ...] = (Health, Question)
+
+
+class RunSettings(BaseModel):
+    """`[run]` of a dataflow file."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
+    out_dir: str = "out"  # runs are written to <out_dir>/<name>; relative to the current folder
+    threads: int = 1  # for each library that has threads of its own; more than 1 can change the last bits
+    model_dirs: list[str] = []  # folders with weights, relative to the dataflow file
+    question_timeout_s: float = 30.0  # after this long a question is answered with an error
+    log_level: str = "INFO"
+
+
+class RunConfig(BaseModel):
+    """A whole dataflow file: which nodes run, and what differs from the defaults."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
+    run: RunSettings = RunSettings()
+    bus: BusConfig = BusConfig()
+    nodes: dict[str, dict[str, Any]]
+
+
+def read(path: Path) -> RunConfig:
+    """Read a dataflow file, by path or by the name of one that comes with placegraph; raises ConfigError."""
+    if not path.exists():
+        packaged = Path(str(resources.files("placegraph.configs"))) / path.name
+        if path.parent.name not in ("", "configs") or not packaged.exists():
+            raise ConfigError(f"{path}: no such dataflow file; with placegraph come: {', '.join(packaged_names())}")
+        path = packaged
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise ConfigError(f"{path}: {error}") from None
+    try:
+        config = RunConfig.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {_first_problem(error)}") from None
+    folders = [str((path.parent / folder).resolve()) for folder in config.run.model_dirs]
+    return config.model_copy(update={"run": config.run.model_copy(update={"model_dirs": folders})})
+
+
+def packaged_names() -> list[str]:
+    """Dataflow files that come with placegraph."""
+    return sorted(item.name for item in resources.files("placegraph.configs").iterdir() if item.name.endswith(".toml"))
+
+
+def _first_problem(error: ValidationError) -> str:
+    first = error.errors()[0]
+    section, *keys = [str(part) for part in first["loc"]]
+    return f"[{section}] {'.'.join(keys)}: {first['msg']}"
+
+
+@dataclass(frozen=True)
+class Dataflow:
+    """Nodes in an order in which each comes after those that feed it, and who gives what to whom."""
+
+    config: RunConfig
+    context: Context
+    nodes: dict[str, Node]
+
+    @property
+    def source(self) -> Source:
+        """The one node that takes nothing."""
+        return next(node for node in self.nodes.values() if isinstance(node, Source))
+
+    def giver(self, kind: type[Message]) -> str | None:
+        """Name of the node that gives a kind."""
+        return next((name for name, node in self.nodes.items() if kind in node.gives), None)
+
+    def takers(self, kind: type[Message]) -> list[str]:
+        """Names of the nodes that take a kind, in order."""
+        return [name for name, node in self.nodes.items() if kind in node.takes]
+
+    def waited_for(self, name: str) -> dict[str, list[str]]:
+        """For each kind a node gives: the takers it waits for."""
+        return {
+            kind.__name__: [t for t in self.takers(kind) if kind not in self.nodes[t].feedback]
+            for kind in self.nodes[name].gives
+        }
+
+
+def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
+    """Build every node without starting it and check the wiring; raises ConfigError naming the node."""
+    base = Context(
+        threads=config.run.threads,
+        model_dirs=tuple(config.run.model_dirs),
+        out_dir=str(out_dir) if out_dir else "",
+    )
+    nodes = {name: build_node(name, settings, base) for name, settings in config.nodes.items()}
+    sources = [name for name, node in nodes.items() if isinstance(node, Source)]
+    if len(sources) != 1:
+        raise ConfigError(f"expected one source (camera or playback), found {', '.join(sources) or 'none'}")
+    source = nodes[sources[0]]
+    assert isinstance(source, Source)
+    context = base.model_copy(update={"lossless": source.is_lossless()})
+    for node in nodes.values():
+        node.context = context
+    dataflow = Dataflow(config, context, {name: nodes[name] for name in _order(nodes)})
+    _check_wiring(dataflow)
+    return dataflow
+
+
+def _order(nodes: dict[str, Node]) -> list[str]:
+    feeds: dict[str, set[str]] = {name: set() for name in sorted(nodes)}
+    for name, node in nodes.items():
+        for kind in node.takes:
+            if kind not in node.feedback:
+                feeds[name] |= {giver for giver, other in nodes.items() if kind in other.gives}
+    try:
+        return list(graphlib.TopologicalSorter(feeds).static_order())
+    except graphlib.CycleError as error:
+        raise ConfigError(
+            f"the dataflow has a cycle that no node declares as feedback: {' -> '.join(error.args[1])}"
+        ) from None
+
+
+def _check_wiring(dataflow: Dataflow) -> None:
+    for kind in {kind for node in dataflow.nodes.values() for kind in node.gives}:
+        givers = [name for name, node in dataflow.nodes.items() if kind in node.gives]
+        if len(givers) > 1:
+            raise ConfigError(f"{kind.__name__} is given by {' and '.join(givers)}: switch one of them off")
+    for name, node in dataflow.nodes.items():
+        for kind in node.takes:
+            needed = kind not in GIVEN_BY_SHELL and kind not in node.feedback and kind not in node.optional
+            if needed and dataflow.giver(kind) is None:
+                raise ConfigError(f"{name} takes {kind.__name__}, which nothing gives")

@@ -1,0 +1,22 @@
+"""The one place logging is configured."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+
+
+class _Format(logging.Formatter):
+    """`time level node text`, time in UTC."""
+
+    def __init__(self, node: str) -> None:
+        super().__init__(f"%(asctime)s.%(msecs)03d %(levelname)s {node} %(message)s", datefmt="%H:%M:%S")
+        self.converter = time.gmtime
+
+
+def configure(node: str, level: str = "INFO") -> None:
+    """Log to stderr with the node's name; calling again replaces what was there."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_Format(node))
+    logging.basicConfig(level=level, handlers=[handler], force=True)

@@ -1,0 +1,302 @@
+"""One node in one OS process: receive, step, publish, report.
+
+Started by the launcher as `python -m placegraph.runtime.process` with one JSON line (`ProcessSpec`) on standard input.
+Standard input then stays open as a lifeline: when it ends the launcher is gone, and so is this process.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections import deque
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import msgpack
+import psutil
+from pydantic import BaseModel, ConfigDict
+
+from placegraph.runtime import log, messages
+from placegraph.runtime.bus import Bus, BusConfig, Request
+from placegraph.runtime.codec import decode, encode
+from placegraph.runtime.errors import PlacegraphError, QueryError
+from placegraph.runtime.flow import Inbox, Parcel, Window
+from placegraph.runtime.health import StepStats
+from placegraph.runtime.messages import Health, Message
+from placegraph.runtime.node import Context, Node, Source, build_node
+from placegraph.runtime.question import error_reply, parse_request
+from placegraph.runtime.topics import TOPICS
+
+logger = logging.getLogger(__name__)
+
+POLL_S = 0.2
+KEPT_FOR_CRASH = 4  # messages written to the crash file: the failing one and what led to it
+MAX_WAITING_QUESTIONS = 16
+
+
+class ProcessSpec(BaseModel):
+    """What a process is told on its first line of input."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    node: str
+    settings: dict[str, Any]
+    context: Context
+    bus: BusConfig
+    takers: dict[str, list[str]]  # kind given -> nodes to wait for
+    question_timeout_s: float
+    log_level: str = "INFO"
+
+
+class Process:
+    """The shell around one node."""
+
+    def __init__(self, spec: ProcessSpec, node: Node) -> None:
+        self.spec, self.node = spec, node
+        newest = {} if spec.context.lossless else {k: TOPICS[k].newest for k in node.takes if TOPICS[k].newest}
+        self.inbox = Inbox(newest)
+        self.stats = StepStats(spec.node)
+        self.started, self.stopping = threading.Event(), threading.Event()
+        self.windows: dict[type[Message], Window] = {}
+        self._puts: dict[type[Message], Any] = {}
+        self._sequences: dict[type[Message], int] = {}
+        self._expected: dict[type[Message], int] = {}
+        self._requests: dict[str, Request] = {}
+        self._recent: deque[Parcel] = deque(maxlen=KEPT_FOR_CRASH)
+        self._asked = 0
+        self._lock = threading.Lock()
+
+    # --- wiring
+
+    def connect(self, bus: Bus) -> None:
+        """Declare publishers, subscribers and the token that says this process is ready."""
+        self._receipt = bus.publisher("receipt", self.spec.node)
+        serves = self.node.serves
+        given = {*self.node.gives, Health, *((serves[0],) if serves else ())}
+        for kind in sorted(given, key=lambda kind: kind.__name__):
+            topic = TOPICS[kind]
+            self._puts[kind] = bus.publisher("topic", topic.key)
+            waits = not topic.newest or self.spec.context.lossless
+            if topic.window and waits and (takers := self.spec.takers.get(kind.__name__)):
+                self.windows[kind] = Window(topic.window, takers)
+        bus.subscribe(self._on_control, "control")
+        bus.subscribe(self._on_receipt, "receipt", "*")
+        bus.watch_alive(self._on_alive)
+        for kind in self.node.takes:
+            if serves and kind is serves[0]:
+                bus.serve(self._on_request, "ask")
+            else:
+                bus.subscribe(self._subscriber(kind), "topic", TOPICS[kind].key)
+        bus.declare_alive(self.spec.node)
+
+    def _subscriber(self, kind: type[Message]) -> Any:
+        return lambda key, payload, attachment: self.inbox.put(Parcel(kind, int.from_bytes(attachment), payload))
+
+    def _on_control(self, key: str, payload: bytes, attachment: bytes) -> None:
+        if payload == b"start":
+            self.started.set()
+        elif payload == f"stop {self.spec.node}".encode():
+            self.stop()
+
+    def _on_receipt(self, key: str, payload: bytes, attachment: bytes) -> None:
+        kind, sequence = msgpack.unpackb(payload)
+        window = self.windows.get(getattr(messages, kind))
+        if window is not None:
+            window.confirm(key.rsplit("/", 1)[-1], sequence)
+
+    def _on_alive(self, name: str, present: bool) -> None:
+        for window in self.windows.values():
+            window.set_present(name, present)
+
+    def _on_request(self, request: Request) -> None:
+        """Turn a query into a Question in the inbox; a timer answers for a node that is too slow."""
+        with self._lock:
+            self._asked += 1
+            question_id = f"Q{self._asked}"
+            busy = len(self._requests) >= MAX_WAITING_QUESTIONS
+            if not busy:
+                self._requests[question_id] = request
+        if busy:
+            request.reply(error_reply("", f"busy: {MAX_WAITING_QUESTIONS} questions are waiting"))
+            return
+        try:
+            question = parse_request(request.payload, question_id)
+        except QueryError as error:
+            self._answer(question_id, error_reply("", str(error)))
+            return
+        # the shell's own id keeps two askers apart who chose the same one
+        self.inbox.put(Parcel(type(question), 0, msgpack.packb([question_id, encode(question)])))
+        limit = self.spec.question_timeout_s
+        reason = f"no answer within {limit:g} s"
+        timer = threading.Timer(limit, lambda: self._answer(question_id, error_reply("", reason)))
+        timer.daemon = True
+        timer.start()
+
+    def _answer(self, shell_id: str, payload: bytes) -> None:
+        with self._lock:
+            request = self._requests.pop(shell_id, None)
+        if request is not None:
+            request.reply(payload)
+
+    def stop(self) -> None:
+        """Finish what has arrived, then end."""
+        self.stopping.set()
+        self.started.set()
+        self.inbox.close()
+
+    # --- work
+
+    def run(self) -> None:
+        """Step until told to stop; raises what `step` raised after writing the crash file."""
+        if isinstance(self.node, Source):
+            self._run_source(self.node)
+        while not self.inbox.drained:
+            parcel = self.inbox.get(POLL_S)
+            if parcel is not None:
+                self._take(parcel)
+
+    def _run_source(self, source: Source) -> None:
+        self.started.wait()
+        began = time.monotonic()
+        for message in source.messages():
+            self.stats.add_step(time.monotonic() - began)
+            if self.stopping.is_set() or not self._publish(message):
+                return
+            began = time.monotonic()
+
+    def _take(self, parcel: Parcel) -> None:
+        self._recent.append(parcel)
+        payload, shell_id = parcel.payload, ""
+        if self.node.serves and parcel.kind is self.node.serves[0]:
+            shell_id, payload = msgpack.unpackb(payload)
+        else:
+            self._check_order(parcel)
+        message = decode(parcel.kind, payload)
+        if shell_id:
+            self._publish(message)
+        began = time.monotonic()
+        try:
+            given = self.node.step(message)
+        except Exception:
+            self._write_crash(traceback.format_exc())
+            if shell_id:
+                self._answer(shell_id, error_reply("", f"the {self.spec.node} node failed; see its log"))
+            raise
+        self.stats.add_step(time.monotonic() - began)
+        for out in given:
+            self._publish(out)
+            if shell_id and self.node.serves and isinstance(out, self.node.serves[1]):
+                self._answer(shell_id, out.json.encode())  # type: ignore[attr-defined]
+        if parcel.sequence and parcel.kind not in self.node.feedback:
+            self._receipt(msgpack.packb([parcel.kind.__name__, parcel.sequence]), b"")
+
+    def _check_order(self, parcel: Parcel) -> None:
+        """Every kind that must not be lost has gapless numbers; a gap in a replay would give another graph."""
+        lossless, kind = self.spec.context.lossless, parcel.kind
+        if kind is Health:  # every process gives it: its numbers run in parallel
+            return
+        expected = self._expected.get(kind, 1 if lossless else parcel.sequence)
+        self._expected[kind] = parcel.sequence + 1
+        lost = parcel.sequence - expected
+        if lost and lossless:
+            raise PlacegraphError(
+                f"{lost} {kind.__name__} lost before number {parcel.sequence}: a replay must not lose any"
+            )
+        if lost > 0 and not TOPICS[kind].newest:
+            logger.warning("%d %s lost before number %d", lost, kind.__name__, parcel.sequence)
+
+    def _publish(self, message: Message) -> bool:
+        """Send when the takers have room; False when the process is stopping and they have none."""
+        kind = type(message)
+        window = self.windows.get(kind)
+        sequence: int | None
+        if window is None:
+            sequence = self._sequences[kind] = self._sequences.get(kind, 0) + 1
+        else:
+            while (sequence := window.reserve(POLL_S)) is None:
+                if self.stopping.is_set() and isinstance(self.node, Source):
+                    return False
+        self._puts[kind](encode(message), sequence.to_bytes(8))
+        return True
+
+    def _write_crash(self, trace: str) -> None:
+        if not self.spec.context.out_dir:
+            return
+        folder = Path(self.spec.context.out_dir) / "crash"
+        folder.mkdir(parents=True, exist_ok=True)
+        parcels = [[p.kind.__name__, p.payload] for p in self._recent]
+        record = [self.spec.model_dump_json(), trace, parcels]
+        (folder / f"{self.spec.node}.rec").write_bytes(msgpack.packb(record))
+
+    def report_health(self) -> None:
+        """Publish Health once a second until stopped; runs in its own thread."""
+        memory, last = psutil.Process(), time.monotonic()
+        while not self.stopping.wait(1.0):
+            now = time.monotonic()
+            self._publish_health(now - last, memory.memory_info().rss / 1e6)
+            last = now
+
+    def _publish_health(self, elapsed_s: float, memory_mb: float) -> None:
+        drops = self.inbox.drops
+        fresh = sum(drops.values()) - self.stats.drops
+        if fresh:
+            names = ", ".join(f"{count} {kind.__name__}" for kind, count in drops.items())
+            logger.warning("dropped for newer ones so far: %s", names)
+        self.stats.drops += fresh
+        self._publish(self.stats.report(elapsed_s, len(self.inbox), memory_mb))
+
+
+def _die_with_launcher() -> None:
+    while sys.stdin.buffer.read(4096):
+        pass
+    os._exit(3)  # the launcher is gone: nobody is left to stop this process in order
+
+
+def main() -> int:
+    """Run one node until told to stop; exit status 0 in order, 1 after an error (logged)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the launcher stops us in order
+    spec = ProcessSpec.model_validate_json(sys.stdin.buffer.readline())
+    log.configure(spec.node, spec.log_level)
+    threading.Thread(target=_die_with_launcher, daemon=True).start()
+    node: Node | None = None
+    try:
+        node = build_node(spec.node, spec.settings, spec.context)
+        node.start()
+        process = Process(spec, node)
+
+        def on_terminate(number: int, frame: FrameType | None) -> None:
+            process.stop()
+
+        signal.signal(signal.SIGTERM, on_terminate)
+        with Bus(spec.bus) as bus:
+            process.connect(bus)
+            logger.info("ready")
+            reporter = threading.Thread(target=process.report_health, daemon=True)
+            reporter.start()
+            try:
+                process.run()
+            finally:
+                process.stopping.set()
+                reporter.join()
+                process._publish_health(1.0, psutil.Process().memory_info().rss / 1e6)
+        logger.info("stopped after %d steps", process.stats.steps)
+        return 0
+    except PlacegraphError as error:
+        logger.error("%s: %s", type(error).__name__, error)
+        return 1
+    except Exception:
+        logger.exception("step failed")
+        return 1
+    finally:
+        if node is not None:
+            node.stop()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
