@@ -22,6 +22,7 @@ class KeyframeConfig(NodeConfig):
     rotation_rad: float = Field(0.1, gt=0)  # departs: its 3 deg chooses nearly every frame of a hand-held camera
     period_s: float = Field(1.0, gt=0)  # departs: its 0.5 s; a camera that stands still sees little that is new
     in_flight: int = Field(4, ge=1)  # live: keyframes that perception may be behind
+    lost_after_s: float = Field(5.0, gt=0)  # live: a keyframe unfinished for so long died with its process
 
 
 class KeyframeNode(Node):
@@ -41,7 +42,7 @@ class KeyframeNode(Node):
         super().__init__(config, context)
         self._join = Join(Frame, Pose)
         self._last: tuple[int, NDArray[np.float64]] | None = None  # stamp and pose of the last keyframe
-        self._in_flight: list[int] = []
+        self._in_flight: dict[int, int] = {}  # frame id to stamp
         self._chosen = 0
         self._last_seen = -1
         self._end: End | None = None
@@ -51,7 +52,7 @@ class KeyframeNode(Node):
         given: list[Message] = []
         if isinstance(message, Segments):
             # a receipt also stands for older keyframes: theirs were lost with a process that was started again
-            self._in_flight = [i for i in self._in_flight if i > message.frame_id]
+            self._in_flight = {i: stamp for i, stamp in self._in_flight.items() if i > message.frame_id}
         elif isinstance(message, End):
             self._end = message
         elif (joined := self._join.add(message)) is not None:
@@ -68,7 +69,7 @@ class KeyframeNode(Node):
     def _is_worth(self, frame: Frame, pose: Pose) -> bool:
         if not pose.trusted:
             return False
-        if not self.context.lossless and len(self._in_flight) >= self.config.in_flight:
+        if not self.context.lossless and self._perception_is_behind(frame.stamp_ns):
             return False
         if self._last is None:
             return True
@@ -82,11 +83,16 @@ class KeyframeNode(Node):
             or waited_s >= self.config.period_s
         )
 
+    def _perception_is_behind(self, now_ns: int) -> bool:
+        oldest_ns = now_ns - self.config.lost_after_s * 1e9
+        self._in_flight = {i: stamp for i, stamp in self._in_flight.items() if stamp > oldest_ns}
+        return len(self._in_flight) >= self.config.in_flight
+
     def _choose(self, frame: Frame, pose: Pose) -> Keyframe:
         self._last = (frame.stamp_ns, pose.world_from_camera)
         self._chosen += 1
         self._last_keyframe_id = frame.frame_id
-        self._in_flight.append(frame.frame_id)
+        self._in_flight[frame.frame_id] = frame.stamp_ns
         return Keyframe(
             frame_id=frame.frame_id,
             stamp_ns=frame.stamp_ns,

@@ -103,6 +103,12 @@ class Launcher:
             self._spawn(name)
             self._bus.put(b"start", "control")
 
+    def stop_source(self) -> None:
+        """Let the source end in order, so that the last map and graph follow."""
+        name = next(name for name, node in self._dataflow.nodes.items() if node is self._dataflow.source)
+        self._stopped.add(name)
+        self._bus.put(f"stop {name}".encode(), "control")
+
     def stop(self) -> None:
         """Stop in the order of the dataflow, each node after it has finished what it got; kills what does not end."""
         for name in self._dataflow.nodes:

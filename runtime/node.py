@@ -8,6 +8,8 @@ import pkgutil
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from placegraph.runtime.errors import ConfigError
@@ -58,9 +60,15 @@ class Node:
 class Source(Node):
     """A node that takes nothing and gives messages by itself: a camera, or a recording."""
 
+    ending: bool = False  # set by the shell: give what says the end and return
+
     def is_lossless(self) -> bool:
         """Whether every message must arrive (data sets, recordings) or the newest wins (a live camera)."""
         raise NotImplementedError
+
+    def given_poses(self) -> dict[int, NDArray[np.float64]] | None:
+        """stamp_ns to (4, 4) world_from_camera that the data bring, for evaluation; None when they bring none."""
+        return None
 
     def messages(self) -> Iterator[Message]:
         """What it gives, ending with the message that says so."""

@@ -62,7 +62,8 @@ class Process:
         newest = {} if spec.context.lossless else {k: TOPICS[k].newest for k in node.takes if TOPICS[k].newest}
         self.inbox = Inbox(newest)
         self.stats = StepStats(spec.node)
-        self.started, self.stopping = threading.Event(), threading.Event()
+        self.started, self.aborting = threading.Event(), threading.Event()
+        self._ended = threading.Event()
         self.windows: dict[type[Message], Window] = {}
         self._puts: dict[type[Message], Any] = {}
         self._sequences: dict[type[Message], int] = {}
@@ -145,10 +146,16 @@ class Process:
             request.reply(payload)
 
     def stop(self) -> None:
-        """Finish what has arrived, then end."""
-        self.stopping.set()
+        """Finish what has arrived, then end; a source ends as if there were no more to give."""
+        if isinstance(self.node, Source):
+            self.node.ending = True
         self.started.set()
         self.inbox.close()
+
+    def abort(self) -> None:
+        """End after the step in hand; what has arrived is left."""
+        self.aborting.set()
+        self.stop()
 
     # --- work
 
@@ -156,7 +163,7 @@ class Process:
         """Step until told to stop; raises what `step` raised after writing the crash file."""
         if isinstance(self.node, Source):
             self._run_source(self.node)
-        while not self.inbox.drained:
+        while not self.inbox.drained and not self.aborting.is_set():
             parcel = self.inbox.get(POLL_S)
             if parcel is not None:
                 self._take(parcel)
@@ -166,7 +173,7 @@ class Process:
         began = time.monotonic()
         for message in source.messages():
             self.stats.add_step(time.monotonic() - began)
-            if self.stopping.is_set() or not self._publish(message):
+            if not self._publish(message):
                 return
             began = time.monotonic()
 
@@ -212,7 +219,7 @@ class Process:
             logger.warning("%d %s lost before number %d", lost, kind.__name__, parcel.sequence)
 
     def _publish(self, message: Message) -> bool:
-        """Send when the takers have room; False when the process is stopping and they have none."""
+        """Send when the takers have room; False when told to abort before they have."""
         kind = type(message)
         window = self.windows.get(kind)
         sequence: int | None
@@ -220,7 +227,7 @@ class Process:
             sequence = self._sequences[kind] = self._sequences.get(kind, 0) + 1
         else:
             while (sequence := window.reserve(POLL_S)) is None:
-                if self.stopping.is_set() and isinstance(self.node, Source):
+                if self.aborting.is_set():
                     return False
         self._puts[kind](encode(message), sequence.to_bytes(8))
         return True
@@ -235,12 +242,17 @@ class Process:
         (folder / f"{self.spec.node}.rec").write_bytes(msgpack.packb(record))
 
     def report_health(self) -> None:
-        """Publish Health once a second until stopped; runs in its own thread."""
+        """Publish Health once a second and at the end; runs in its own thread."""
         memory, last = psutil.Process(), time.monotonic()
-        while not self.stopping.wait(1.0):
+        while not self._ended.wait(1.0):
             now = time.monotonic()
             self._publish_health(now - last, memory.memory_info().rss / 1e6)
             last = now
+        self._publish_health(time.monotonic() - last, memory.memory_info().rss / 1e6)
+
+    def end(self) -> None:
+        """Let `report_health` give its last report and return."""
+        self._ended.set()
 
     def _publish_health(self, elapsed_s: float, memory_mb: float) -> None:
         drops = self.inbox.drops
@@ -253,7 +265,7 @@ class Process:
 
 
 def _die_with_launcher() -> None:
-    while sys.stdin.buffer.read(4096):
+    while os.read(0, 4096):  # not sys.stdin: its lock, held here, would abort the interpreter's shutdown
         pass
     os._exit(3)  # the launcher is gone: nobody is left to stop this process in order
 
@@ -271,7 +283,7 @@ def main() -> int:
         process = Process(spec, node)
 
         def on_terminate(number: int, frame: FrameType | None) -> None:
-            process.stop()
+            process.abort()
 
         signal.signal(signal.SIGTERM, on_terminate)
         with Bus(spec.bus) as bus:
@@ -282,9 +294,8 @@ def main() -> int:
             try:
                 process.run()
             finally:
-                process.stopping.set()
+                process.end()
                 reporter.join()
-                process._publish_health(1.0, psutil.Process().memory_info().rss / 1e6)
         logger.info("stopped after %d steps", process.stats.steps)
         return 0
     except PlacegraphError as error:

@@ -8,7 +8,7 @@ by. The timeline `sequence` is the order of writing; `frame` and `capture_time` 
 from __future__ import annotations
 
 import heapq
-import logging
+import socket
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -31,17 +31,18 @@ SEQUENCE, FRAME, CAPTURE_TIME = "sequence", "frame", "capture_time"
 CHECKSUM = "declaration_checksum"
 PROPERTIES = "placegraph"
 
-# departs: Rerun's 0.2 s writes five small chunks a second for each entity, 2.2 kB of headers each; a killed process
-# loses at most this much.
+# departs: Rerun's 0.2 s writes five small chunks a second for each entity, 2.2 kB of headers each. Under load its timer
+# was seen to leave chunks pending for several seconds, so the writer also flushes by volume: what a killed process
+# loses is bounded by both, and a reader holds no more than that.
 FLUSH_S = 1.0
-FLUSH_BYTES = 1 << 20
+CHUNK_BYTES = 1 << 20
+FLUSH_BYTES = 2 << 20
 # Measured on ten 640x480 7-Scenes pairs, one thread: colour 15 ms and 369 kB (default strategy: 17 ms and 417 kB; LZ4:
 # 1.3 ms and 772 kB), depth 6.4 ms and 96 kB (LZ4: 0.8 ms and 167 kB). Keyframes come once or twice a second on a disk
 # that is small, so size wins; RLE is both faster and smaller than zlib's search on camera noise.
 PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
 
 M = TypeVar("M", bound=Message)
-log = logging.getLogger(__name__)
 
 
 class RecordingWriter:
@@ -61,13 +62,14 @@ class RecordingWriter:
         viewer_port: int = 0,
         blueprint: Any = None,
     ) -> None:
-        batcher = rr.ChunkBatcherConfig(flush_tick=FLUSH_S, flush_num_bytes=FLUSH_BYTES)
+        batcher = rr.ChunkBatcherConfig(flush_tick=FLUSH_S, flush_num_bytes=CHUNK_BYTES)
         self.stream = rr.RecordingStream(APPLICATION, recording_id=run_id, batcher_config=batcher)
         sinks: list[Any] = []
         if path is not None:
             _require_writable(path)
             sinks.append(rr.FileSink(str(path)))
         if viewer_port:
+            _require_free(viewer_port)  # Rerun only prints when it cannot listen
             sinks.append(rr.GrpcServerSink("127.0.0.1", viewer_port, server_memory_limit="512MB"))
         if not sinks:
             raise ConfigError("a recording needs a file, a viewer port, or both")
@@ -78,6 +80,7 @@ class RecordingWriter:
         if properties:
             self.stream.send_property(PROPERTIES, rr.AnyValues(**{k: pa.array([v]) for k, v in properties.items()}))
         self._sequence = 0
+        self._unflushed = 0  # bytes
         self._newest = (0, 0)  # frame id and capture time
 
     def set_time(self, message: Message) -> None:
@@ -110,6 +113,10 @@ class RecordingWriter:
         self.set_time(message)
         self.stream.set_time(SEQUENCE, sequence=self._sequence)
         self._sequence += 1
+        self._unflushed += sum(column.nbytes for column in columns.values())
+        if self._unflushed > FLUSH_BYTES:
+            self._unflushed = 0
+            self.stream.flush()
         entity = rr.DynamicArchetype(kind.__name__, components=columns)
         self.stream.log(f"{MESSAGES}/{kind.__name__}", entity, strict=True)
         self.stream.reset_time()  # what a person sees carries no sequence: there would be one row for each
@@ -176,6 +183,15 @@ def _require_writable(path: Path) -> None:
             pass
     except OSError as error:
         raise ConfigError(f"cannot write the recording {path}: {error.strerror}") from None
+
+
+def _require_free(port: int) -> None:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError as error:
+            raise ConfigError(f"viewer port {port} on 127.0.0.1: {error.strerror}") from None
 
 
 def _is_image(spec: ArraySpec) -> bool:

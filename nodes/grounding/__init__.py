@@ -1,1 +1,108 @@
-"""x"""
+"""Grounding: scene graph and question to answer; also names rooms and locations.
+
+Source: paper, "Deductive Hierarchical Reasoning Algorithm", "Room Layer" and "Location Layer" (their text tags).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from placegraph.models_onnx.text import TextEncoder
+from placegraph.nodes.grounding.answer import Reasoner, error_answer, to_json
+from placegraph.nodes.grounding.llm import N_CTX, LanguageModel
+from placegraph.nodes.grounding.names import Names
+from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES, Namer
+from placegraph.nodes.grounding.program import SAFE
+from placegraph.runtime.errors import ConfigError, QueryError
+from placegraph.runtime.messages import Answer, Graph, Message, PlaceNames, Question
+from placegraph.runtime.node import Context, Node, NodeConfig
+from placegraph.runtime.scene_graph import SceneGraph
+
+
+class GroundingConfig(NodeConfig):
+    """Settings of the grounding node."""
+
+    model_path: str = ""  # a GGUF file; empty: the packaged SmolLM2-135M-Instruct
+    n_ctx: int = N_CTX  # tokens
+    seed: int = 0
+    name_places: bool = True  # False: rooms and locations stay without names
+    use_model: bool = True  # False: no question is put to the language model; what it would decide stays open
+    room_types: tuple[str, ...] = ROOM_TYPES
+    location_types: tuple[str, ...] = LOCATION_TYPES
+
+
+class Grounding(Node):
+    """Keeps the newest graph, names its places, and answers each question with exactly one Answer."""
+
+    config_type = GroundingConfig
+    takes = (Graph, Question)
+    gives = (PlaceNames, Answer)
+    serves = (Question, Answer)
+
+    def __init__(self, config: GroundingConfig, context: Context) -> None:
+        super().__init__(config, context)
+        for setting, types in (("room_types", config.room_types), ("location_types", config.location_types)):
+            wrong = [name for name in types if not SAFE.fullmatch(name)]
+            if wrong or not types:
+                raise ConfigError(f"[nodes.grounding] {setting}: names of letters and digits expected, found {wrong}")
+        path = Path(config.model_path) if config.model_path else None
+        self._model = LanguageModel(path, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed)
+        self._namer = Namer(self._model, config.room_types, config.location_types)
+        types = (*config.room_types, *config.location_types)
+        names = Names(TextEncoder().encode)
+        self._reasoner = Reasoner(names, self._model, types, use_model=config.use_model)
+        self._graph: SceneGraph | None = None
+        self._revision = -1
+
+    def start(self) -> None:
+        """Load the language model, if it will be used. Raises ModelError."""
+        if self.config.name_places or self.config.use_model:
+            self._model.load()
+
+    def stop(self) -> None:
+        """Release the language model."""
+        self._model.close()
+
+    def step(self, message: Message) -> Sequence[Message]:
+        """A Graph without names gives PlaceNames; a Question gives an Answer. Raises SchemaError for a broken graph."""
+        if isinstance(message, Graph):
+            return self._take_graph(message)
+        assert isinstance(message, Question)
+        return [self._answer(message)]
+
+    def _take_graph(self, message: Graph) -> list[PlaceNames]:
+        self._graph = SceneGraph.from_json(message.json, f"Graph of revision {message.revision}")
+        self._revision = message.revision
+        if message.named:
+            return []
+        found = self._namer.name_places(self._graph) if self.config.name_places else []
+        names = PlaceNames(
+            frame_id=message.frame_id,
+            stamp_ns=message.stamp_ns,
+            revision=message.revision,
+            final=message.final,
+            ids=tuple(name.node_id for name in found),
+            names=tuple(name.name for name in found),
+            weights=np.array([name.weight for name in found], np.float32),
+        )
+        return [names]
+
+    def _answer(self, question: Question) -> Answer:
+        try:
+            if self._graph is None:
+                raise QueryError("no scene graph has arrived yet")
+            fields = self._reasoner.answer(self._graph, self._revision, question)
+        except QueryError as error:  # a question always gets a reply
+            fields = error_answer(question, self._revision, str(error))
+        return Answer(
+            frame_id=question.frame_id,
+            stamp_ns=question.stamp_ns,
+            question_id=question.question_id,
+            json=to_json(fields),
+        )
+
+
+NODE = Grounding

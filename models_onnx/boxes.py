@@ -1,0 +1,62 @@
+"""Boxes of a detector's raw output: overlap, and the suppression of repeated finds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.models_onnx import Boxes
+
+F32 = NDArray[np.float32]
+I64 = NDArray[np.int64]
+
+MAX_CANDIDATES = 1000  # boxes that enter suppression; bounds its time on a network that fires everywhere
+
+
+def iou(one: F32, many: F32) -> F32:
+    """Intersection over union of one box (4,) with many (N, 4), px; 0 where both are empty."""
+    low = np.maximum(one[:2], many[:, :2])
+    high = np.minimum(one[2:], many[:, 2:])
+    shared = np.prod(np.maximum(high - low, 0), axis=1)
+    areas = np.prod(np.maximum(many[:, 2:] - many[:, :2], 0), axis=1)
+    union = np.prod(np.maximum(one[2:] - one[:2], 0)) + areas - shared
+    found: F32 = np.divide(shared, union, out=np.zeros(len(many), np.float32), where=union > 0).astype(np.float32)
+    return found
+
+
+def from_centres(centres: F32) -> F32:
+    """(N, 4) cx cy w h to x_min y_min x_max y_max."""
+    half = centres[:, 2:] / 2
+    return np.concatenate([centres[:, :2] - half, centres[:, :2] + half], axis=1).astype(np.float32)
+
+
+def suppress(boxes: F32, scores: F32, classes: I64, nms_iou: float) -> I64:
+    """Greedy suppression within each class: indices of the boxes (N, 4) kept, best score first (ties: lower index)."""
+    order = np.argsort(-scores, kind="stable")[:MAX_CANDIDATES]
+    kept: list[int] = []
+    while len(order):
+        best, rest = order[0], order[1:]
+        kept.append(int(best))
+        repeats = (iou(boxes[best], boxes[rest]) > nms_iou) & (classes[rest] == classes[best])
+        order = rest[~repeats]
+    return np.array(kept, np.int64)
+
+
+def best_classes(scores: F32, min_score: float) -> tuple[I64, I64, F32]:
+    """Anchors of (A, C) class scores whose best class reaches `min_score`: anchor classes and scores."""
+    if scores.shape[1] == 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.float32)
+    classes = scores.argmax(axis=1)
+    best = np.take_along_axis(scores, classes[:, None], axis=1)[:, 0]
+    anchors = np.flatnonzero(best >= min_score)
+    return anchors, classes[anchors], best[anchors].astype(np.float32)
+
+
+def named(names: Sequence[str], classes: I64, boxes: F32, scores: F32) -> Boxes:
+    """Boxes (N, 4) of class indices (N,) as named boxes; empty ones (all outside the image) are left out."""
+    solid = np.all(boxes[:, 2:] > boxes[:, :2], axis=1)
+    picked = tuple(names[i] for i in classes[solid].tolist())
+    clipped = np.clip(scores[solid], 0, 1).astype(np.float32)
+    return Boxes(picked, np.ascontiguousarray(boxes[solid], np.float32), clipped)

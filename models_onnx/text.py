@@ -1,0 +1,63 @@
+"""Words to vectors, so that "couch" meets "sofa": the only importer of wordllama."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.runtime.errors import ModelError
+
+F32 = NDArray[np.float32]
+
+DIMENSIONS = 256  # of the embedding that travels in wordllama's wheel
+
+
+class TextEncoder:
+    """Text to unit vectors, offline; each text is encoded once and alone, so its vector never depends on others."""
+
+    def __init__(self) -> None:
+        self._rows: dict[str, F32] = {}
+
+    def encode(self, texts: Sequence[str]) -> F32:
+        """Encode texts to (N, 256) unit rows; a zero row where a text has no letter or digit.
+
+        Raises:
+            ModelError: the embedding file that belongs to the wordllama package is missing.
+        """
+        rows = np.zeros((len(texts), DIMENSIONS), np.float32)
+        for i, text in enumerate(texts):
+            if text not in self._rows:
+                self._rows[text] = _encode_one(text)
+            rows[i] = self._rows[text]
+        return rows
+
+
+def _encode_one(text: str) -> F32:
+    words = " ".join(text.split()).lower()  # the tokenizer gives "Couch" and "couch" unrelated tokens
+    if not any(character.isalnum() for character in words):
+        return np.zeros(DIMENSIONS, np.float32)
+    row = np.asarray(_embedding().embed([words])[0], np.float32)
+    length = float(np.linalg.norm(row))
+    return row / np.float32(length) if length > 0 else row
+
+
+@cache
+def _embedding() -> Any:
+    """The table of word vectors, 16 MB, read at first use and shared by all encoders of the process."""
+    root = logging.getLogger()
+    handlers, level = list(root.handlers), root.level
+    import wordllama  # at first use: nodes that compare no words need not load it
+
+    # Importing it calls logging.basicConfig, which would decide the whole process's logging.
+    root.handlers[:] = handlers
+    root.setLevel(level)
+    try:
+        return wordllama.WordLlama.load(cache_dir=Path(wordllama.__file__).parent, disable_download=True)
+    except FileNotFoundError as error:
+        raise ModelError(f"wordllama's word vectors are missing, reinstall the package: {error}") from error

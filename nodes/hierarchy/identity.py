@@ -1,0 +1,73 @@
+"""Keep the ids of places across rebuilds by how much their footprints overlap; an id is never given to another place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+Points = NDArray[np.floating]
+
+LEAST_IOU = 0.1  # departs: a room doubles and doubles again while it is explored, and is still that room
+RASTER_M = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """What identifies a place: its footprint (K, 2) m, world, and the group (say, a floor's id) that it cannot leave."""
+
+    footprint: Points
+    group: str = ""
+
+
+class Identities:
+    """Ids of one layer. A place that was gone and comes back gets its old id back."""
+
+    def __init__(self, letter: str) -> None:
+        self._letter = letter
+        self._known: list[Place] = []  # by number
+
+    def assign(self, places: Sequence[Place]) -> list[str]:
+        """Ids for places, the best total overlap with known ones winning, new ids in the order given."""
+        numbers = [-1] * len(places)
+        if places and self._known:
+            iou = np.array([[overlap(place, known) for known in self._known] for place in places])
+            for row, column in zip(*linear_sum_assignment(-iou), strict=True):
+                if iou[row, column] >= LEAST_IOU:
+                    numbers[row] = int(column)
+        for i, place in enumerate(places):
+            if numbers[i] < 0:
+                numbers[i] = len(self._known)
+                self._known.append(place)
+            else:
+                self._known[numbers[i]] = place
+        return [f"{self._letter}{number}" for number in numbers]
+
+
+def overlap(a: Place, b: Place) -> float:
+    """Intersection over union of two footprints, 0..1; 0 across groups and for outlines without area."""
+    if a.group != b.group or len(a.footprint) < 3 or len(b.footprint) < 3:
+        return 0.0
+    low = np.minimum(a.footprint.min(axis=0), b.footprint.min(axis=0))
+    high = np.maximum(a.footprint.max(axis=0), b.footprint.max(axis=0))
+    if (
+        np.maximum(a.footprint.min(axis=0), b.footprint.min(axis=0))
+        >= np.minimum(a.footprint.max(axis=0), b.footprint.max(axis=0))
+    ).any():
+        return 0.0
+    columns, rows = (np.ceil((high - low) / RASTER_M).astype(int) + 1).tolist()
+    masks = []
+    for place in (a, b):
+        mask = np.zeros((rows, columns), np.uint8)
+        cv2.fillPoly(mask, [np.rint((place.footprint - low) / RASTER_M).astype(np.int32)], 1)
+        masks.append(mask > 0)
+    return float((masks[0] & masks[1]).sum() / (masks[0] | masks[1]).sum())
+
+
+def span_footprint(low_m: float, high_m: float) -> Points:
+    """A floor's heights as a footprint one metre wide, so that floors are told apart by height and not by plan."""
+    return np.array([[low_m, 0], [high_m, 0], [high_m, 1], [low_m, 1]])

@@ -1,0 +1,107 @@
+"""Locations: groups of objects that stand close together in one room.
+
+Source: paper, location layer, by the recipe that made its training labels: DBSCAN on a height band, each object joins the
+cluster with most of its points, clusters with few objects go, project, outline, drop small and elongated polygons.
+Departs: no trained detector; DBSCAN runs on coarse cells of the objects' points, room by room; the outline is that of the
+closed bird's-eye mask, which like an alpha shape may be concave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from placegraph.nodes.hierarchy.floors import FloorSpan
+from placegraph.nodes.hierarchy.rooms import floor_grid
+
+F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+Points = NDArray[np.floating]
+
+
+class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+    """Parameters of the location layer."""
+
+    band_low: float = 0.05  # paper, alpha_min (value not stated): above the noise of the floor
+    band_high: float = 0.8  # paper, alpha_max (value not stated): below lamps
+    cell_m: float = 0.1  # departs: points are thinned to cells of this size before they are clustered
+    eps_m: float = 0.4  # paper, DBSCAN (value not stated): a chair pulled out from its table
+    min_cells: int = 4  # paper, DBSCAN (value not stated)
+    least_objects: int = 2  # paper, c (value not stated)
+    least_area_m2: float = 0.25  # paper (value not stated)
+    compactness: float = 0.25  # paper, C in 4 pi S / P^2 < C (value not stated); a 5:1 strip has .44
+    close_m: float = 0.2  # departs: stands for the alpha of the alpha shape
+
+
+@dataclass(frozen=True, eq=False)
+class LocationArea:
+    """One location: outline (K, 2) in metres, world frame, and the positions of its objects in the list given."""
+
+    outline: F64
+    members: tuple[int, ...]
+
+
+def find_locations(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:
+    """Locations of one room, in the order of their first object.
+
+    objects: the (N, 3) points of each of the room's objects, metres, world frame. Source: paper, "Location Layer",
+    equations 3 to 7.
+    """
+    height = span.high - span.low
+    low, high = span.low + config.band_low * height, span.low + config.band_high * height
+    banded = [xyz[(xyz[:, 2] >= low) & (xyz[:, 2] <= high)] for xyz in objects]
+    owner = np.repeat(np.arange(len(objects)), [len(xyz) for xyz in banded])
+    if not len(owner):
+        return []
+    labels = _cluster(np.concatenate(banded), config)
+    members: dict[int, list[int]] = {}
+    for i in range(len(objects)):
+        votes = labels[(owner == i) & (labels >= 0)]
+        if len(votes):
+            members.setdefault(int(np.argmax(np.bincount(votes))), []).append(i)
+    areas = (_outline([objects[i] for i in group], config) for group in members.values())
+    return [
+        LocationArea(outline, tuple(group))
+        for group, outline in zip(members.values(), areas, strict=True)
+        if len(group) >= config.least_objects and outline is not None
+    ]
+
+
+def _cluster(points: Points, config: LocationConfig) -> I64:
+    """DBSCAN over occupied cells: label of each point (N,), -1 for noise."""
+    cells, cell_of = np.unique(np.floor(points / config.cell_m).astype(np.int64), axis=0, return_inverse=True)
+    pairs = cKDTree(cells).query_pairs(config.eps_m / config.cell_m, output_type="ndarray")
+    core = 1 + np.bincount(pairs.ravel(), minlength=len(cells)) >= config.min_cells
+    both = pairs[core[pairs].all(axis=1)]
+    links = coo_matrix((np.ones(len(both), bool), (both[:, 0], both[:, 1])), shape=(len(cells), len(cells)))
+    _, labels = connected_components(links, directed=False)
+    labels = np.where(core, labels, -1).astype(np.int64)
+    for a, b in pairs[core[pairs].sum(axis=1) == 1].tolist():  # border cells join the core cell beside them
+        outer, inner = (a, b) if core[b] else (b, a)
+        labels[outer] = max(labels[outer], labels[inner])
+    return np.asarray(labels[cell_of.reshape(-1)])
+
+
+def _outline(objects: list[Points], config: LocationConfig) -> F64 | None:
+    xy = np.concatenate(objects)[:, :2]
+    cell = config.cell_m / 2
+    reach = max(1, round(config.close_m / cell))
+    grid = floor_grid(np.concatenate((xy - config.close_m, xy + config.close_m)), cell)
+    mask = np.zeros(grid.shape, np.uint8)
+    mask[grid.cells(xy)] = 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel)
+    outline = grid.outline(mask.astype(bool))
+    area = cv2.contourArea(outline.astype(np.float32))
+    length = cv2.arcLength(outline.astype(np.float32), True)
+    if area < config.least_area_m2 or 4 * np.pi * area < config.compactness * length**2:
+        return None
+    return outline

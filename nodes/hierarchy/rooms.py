@@ -1,0 +1,232 @@
+"""Rooms of one floor from the walls seen from above.
+
+Source: paper, room layer (bird's-eye view, min-max, threshold, walls, distance field, Otsu seeds, watershed), with
+HOV-SG's working values. Departs: a cell weighs by how much of the wall slice's height is occupied, not by its number of
+points; rooms are limited to what was observed (rays and points); seeds are the maxima of the distance field that a
+doorway parts, since Otsu's one threshold hides a narrow corridor beside a hall; flooding follows the distance field
+level by level, since cv2.watershed orders pixels by steps of colour instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+
+from placegraph.nodes.hierarchy.floors import FloorSpan
+
+Bool = NDArray[np.bool_]
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+Points = NDArray[np.floating]
+
+
+class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+    """Parameters of the room layer."""
+
+    cell_m: float = 0.05  # HOV-SG
+    slice_low_m: float = 1.5  # above the floor, HOV-SG
+    slice_high_m: float = 0.3  # below the ceiling, HOV-SG
+    least_slice_m: float = 0.3  # departs: a scan that shows less than this of the slice has walls from lower down
+    partial_low_m: float = 1.0  # ... namely from here: over tables and the backs of chairs
+    level_m: float = 0.1  # a wall counts by the levels of this height that it fills
+    wall_share: float = 0.25  # of the maximum, HOV-SG
+    smooth_m: float = 0.1  # of the distance field, departs: HOV-SG smooths over .5 m, which closes corridors
+    seed_min_m: float = 0.5  # HOV-SG: drop seeds under .5 m across
+    door_m: float = 1.6  # departs: openings up to this wide part rooms; best of 1.2, 1.4, 1.6 on 8 real maps (ipa)
+    neck_share: float = 0.7  # departs: ... if they are this much narrower than the smaller room
+    close_m: float = 0.3  # gaps in what was observed that are closed
+    room_min_m2: float = 1.0
+    wall_min_m: float = 1.0  # less wall than this in all: nothing parts rooms
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Where a bird's-eye image lies: rows run along +y, columns along +x, in cells of `cell_m`."""
+
+    origin: F64  # (2,) metres, world, of the corner of cell (0, 0)
+    cell_m: float
+    shape: tuple[int, int]
+
+    def cells(self, xy: Points) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Row and column of points (N, 2) or more columns, clipped to the image."""
+        cells = np.floor((np.asarray(xy[:, :2], float) - self.origin) / self.cell_m).astype(np.int64)
+        return np.clip(cells[:, 1], 0, self.shape[0] - 1), np.clip(cells[:, 0], 0, self.shape[1] - 1)
+
+    def outline(self, mask: Bool) -> F64:
+        """Outer contour (K, 2) in metres, world, of the largest part of a mask, simplified to half a cell."""
+        # a border and doubled pixels: contours run through pixel centres and would lose half a cell on each side
+        big = cv2.resize(np.pad(mask.view(np.uint8), 1), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
+        contours, _ = cv2.findContours(big, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        contour = cv2.approxPolyDP(max(contours, key=cv2.contourArea), 1.0, True)
+        return np.asarray((contour.reshape(-1, 2) + 0.5) / 2 - 1, float) * self.cell_m + self.origin
+
+
+@dataclass(frozen=True, eq=False)
+class RoomArea:
+    """One room: its mask on the floor's grid and its outline (K, 2) in metres, world frame."""
+
+    mask: Bool
+    outline: F64
+
+
+def floor_grid(xy: Points, cell_m: float) -> Grid:
+    """A grid around points (N, 2) or more columns, N >= 1, in metres with some cells to spare."""
+    low = np.floor(xy[:, :2].min(axis=0).astype(float) / cell_m) - 2
+    high = np.floor(xy[:, :2].max(axis=0).astype(float) / cell_m) + 3
+    columns, rows = (high - low).astype(int)
+    return Grid(low * cell_m, cell_m, (int(rows), int(columns)))
+
+
+def find_rooms(
+    points_world: Points, free_points_world: Points, free_cell_m: float, span: FloorSpan, config: RoomConfig
+) -> tuple[Grid, list[RoomArea]]:
+    """Rooms of one floor, largest first; at least one.
+
+    points_world: (P, 3), P >= 1, and free_points_world: (F, 3) centres of cells seen through, of this floor's zone,
+    metres, world frame; free_cell_m: size of those cells in plan.
+    Source: paper, section "Room Layer"; departures at the head of this file.
+    """
+    grid = floor_grid(np.concatenate((points_world[:, :2], free_points_world[:, :2])), config.cell_m)
+    walls = wall_mask(points_world, span, grid, config)
+    observed = observed_mask(points_world, free_points_world, free_cell_m, grid, config)
+    labels = segment_rooms(walls, observed, config)
+    areas = [labels == i for i in range(1, int(labels.max()) + 1)]
+    areas = sorted(areas, key=lambda mask: -int(mask.sum()))  # stable: equals keep the order of their labels
+    large = [mask for mask in areas if mask.sum() * config.cell_m**2 >= config.room_min_m2]
+    masks = large or areas[:1] or [observed]
+    return grid, [RoomArea(mask, grid.outline(mask)) for mask in masks]
+
+
+def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomConfig) -> Bool:
+    """Cells where the slice between furniture and ceiling is filled: walls, and the lintels of open doors."""
+    above = points_world[:, 2] - span.low
+    low, high = config.slice_low_m, span.high - span.low - config.slice_high_m
+    if high - low < config.least_slice_m:
+        low, high = config.partial_low_m, max(span.high - span.low, config.partial_low_m + config.level_m)
+    tall = (above >= low) & (above <= high)
+    rows, columns = grid.cells(points_world[tall])
+    levels = np.floor((above[tall] - low) / config.level_m).astype(np.int64)
+    filled = np.unique((levels * grid.shape[0] + rows) * grid.shape[1] + columns) % (grid.shape[0] * grid.shape[1])
+    density = np.bincount(filled, minlength=grid.shape[0] * grid.shape[1]).reshape(grid.shape).astype(np.float32)
+    if density.max() == 0:
+        return np.zeros(grid.shape, bool)
+    density = cv2.GaussianBlur(density / density.max(), (3, 3), 0)
+    walls = (density > config.wall_share * density.max()).astype(np.uint8)
+    return cv2.morphologyEx(walls, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)).astype(bool)
+
+
+def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid: Grid, config: RoomConfig) -> Bool:
+    """Cells that a ray crossed or that hold a point, small gaps closed."""
+    seen = np.zeros(grid.shape, np.uint8)
+    seen[grid.cells(free_points)] = 1
+    side = max(1, int(np.ceil(free_cell_m / grid.cell_m))) | 1  # a free cell is wider than a pixel
+    seen = cv2.dilate(seen, np.ones((side, side), np.uint8))
+    seen[grid.cells(points)] = 1
+    reach = max(1, round(config.close_m / grid.cell_m))
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    padded = cv2.copyMakeBorder(seen, reach, reach, reach, reach, cv2.BORDER_CONSTANT, value=0)
+    return cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[reach:-reach, reach:-reach].astype(bool)
+
+
+def segment_rooms(walls: Bool, observed: Bool, config: RoomConfig) -> I32:
+    """Label image of rooms (0: none) from bool images of walls and of what was observed, in cells of `cell_m`."""
+    open_space = observed & ~walls
+    if not open_space.any() or walls.sum() * config.cell_m < config.wall_min_m:
+        return observed.astype(np.int32)
+    field = distance_field(walls, config)
+    field[~open_space] = 0
+    return flood(field, open_space, config)
+
+
+def distance_field(walls: Bool, config: RoomConfig) -> F32:
+    """Metres to the nearest wall, lightly smoothed. Source: paper, room layer (EDF)."""
+    field = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * config.cell_m
+    return np.asarray(cv2.GaussianBlur(field, (0, 0), config.smooth_m / config.cell_m), np.float32)
+
+
+def flood(field: F32, space: Bool, config: RoomConfig) -> I32:
+    """Watershed of a distance field (metres) inside `space`, from the highest level down.
+
+    Every maximum is a seed; where two basins meet, the level is half the width of the neck between them, and they are
+    one room unless it is as narrow as a door and narrower than either. Returns labels 1..n, 0 elsewhere.
+    """
+    labels = np.zeros(field.shape, np.int32)
+    heights: dict[int, float] = {}  # distance field at the seed of each basin
+    parted: set[tuple[int, int]] = set()
+    levels = np.arange(float(field.max()), config.seed_min_m / 2, -config.cell_m).tolist()
+    for level in levels:
+        mask = space & (field >= level)
+        for new in _unlabelled_parts(mask, labels):
+            number = len(heights) + 1
+            heights[number] = level
+            labels[new] = number
+        _grow(labels, mask)
+        _join_basins(labels, heights, parted, level, config)
+    _grow(labels, space)
+    found, numbers = np.unique(labels[labels > 0], return_inverse=True)
+    if not len(found):  # all of it is narrower than a seed
+        return space.astype(np.int32)
+    labels[labels > 0] = numbers + 1
+    return labels
+
+
+def _unlabelled_parts(mask: Bool, labels: I32) -> list[tuple[NDArray[np.int64], ...]]:
+    _, parts = cv2.connectedComponents(mask.view(np.uint8), connectivity=4)
+    known = np.zeros(int(parts.max()) + 1, bool)
+    known[parts[labels > 0]] = True
+    known[0] = True
+    return [np.nonzero(parts == part) for part in np.flatnonzero(~known)]
+
+
+def _grow(labels: I32, mask: Bool) -> None:
+    """Let basins grow into the free cells of a mask, one ring at a time; the later basin wins a tie."""
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    rest = mask & (labels == 0)
+    while rest.any():
+        spread = cv2.dilate(labels.astype(np.float32), cross).astype(np.int32)
+        reached = rest & (spread > 0)
+        if not reached.any():
+            return
+        labels[reached] = spread[reached]
+        rest &= ~reached
+
+
+def _join_basins(
+    labels: I32, heights: dict[int, float], parted: set[tuple[int, int]], level: float, config: RoomConfig
+) -> None:
+    heir: dict[int, int] = {}
+    for pair in _touching(labels):
+        a, b = (_last_heir(heir, number) for number in pair)
+        if a == b or (min(a, b), max(a, b)) in parted:
+            continue
+        if 2 * level <= config.door_m and level <= config.neck_share * min(heights[a], heights[b]):
+            parted.add((min(a, b), max(a, b)))
+            continue
+        kept, gone = (a, b) if heights[a] >= heights[b] else (b, a)
+        heir[gone] = kept
+        for old in [pair for pair in parted if gone in pair]:
+            parted.discard(old)
+            other = old[0] if old[1] == gone else old[1]
+            parted.add((min(kept, other), max(kept, other)))
+    if heir:
+        table = np.array([0, *(_last_heir(heir, number) for number in heights)], np.int32)
+        labels[:] = table[labels]
+
+
+def _last_heir(heir: dict[int, int], number: int) -> int:
+    while number in heir:
+        number = heir[number]
+    return number
+
+
+def _touching(labels: I32) -> list[tuple[int, int]]:
+    found: set[tuple[int, int]] = set()
+    for a, b in ((labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])):
+        meet = (a != b) & (a > 0) & (b > 0)
+        found |= set(zip(np.minimum(a[meet], b[meet]).tolist(), np.maximum(a[meet], b[meet]).tolist(), strict=True))
+    return sorted(found)

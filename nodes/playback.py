@@ -1,0 +1,78 @@
+"""Node `playback`: a source that gives recorded messages again, so that the nodes behind them can be rerun."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.messages import Keyframe, LastKeyframe, Message, all_kinds
+from placegraph.runtime.node import Context, NodeConfig, Source
+from placegraph.runtime.recording import kinds_in, read
+
+
+class PlaybackConfig(NodeConfig):
+    """Settings of `playback`."""
+
+    path: str  # the recording
+    kinds: tuple[str, ...] = Field(default=("Pose", "Keyframe", "LastKeyframe"), strict=False)  # TOML has lists only
+    incomplete: bool = False  # True: of a recording that was cut, take what is there and end after its last keyframe
+
+
+class Playback(Source):
+    """Gives the recorded messages of its kinds, exact and in recorded order."""
+
+    config_type: ClassVar[type[NodeConfig]] = PlaybackConfig
+
+    def __init__(self, config: Any, context: Context) -> None:
+        super().__init__(config, context)
+        known = {kind.__name__: kind for kind in all_kinds()}
+        for name in config.kinds:
+            if name not in known:
+                raise ConfigError(f"[nodes.playback] kinds: no message {name!r}; there are: {', '.join(known)}")
+        if len(set(config.kinds)) != len(config.kinds) or not config.kinds:
+            raise ConfigError(f"[nodes.playback] kinds: expected each kind once, at least one: {list(config.kinds)}")
+        self.gives: tuple[type[Message], ...] = tuple(known[name] for name in config.kinds)
+
+    def is_lossless(self) -> bool:
+        """A recording can wait."""
+        return True
+
+    def messages(self) -> Iterator[Message]:
+        """The recorded messages in recorded order.
+
+        Raises SourceError when there is no such file, no Keyframe in it, or it was cut before its end and the setting
+        `incomplete` is off; SchemaError when it cannot be read.
+        """
+        path = Path(self.config.path)
+        counts = kinds_in(path)
+        if Keyframe in self.gives:
+            _require_keyframes(path, counts)
+        ends = LastKeyframe in self.gives and not counts.get("LastKeyframe", 0)
+        if ends and not self.config.incomplete:
+            raise SourceError(
+                f"{path}: has no LastKeyframe: the recording was cut before its end. "
+                "Set `incomplete = true` in [nodes.playback] to end after its last keyframe"
+            )
+        last, keyframes = LastKeyframe(frame_id=-1, stamp_ns=0, keyframes=0), 0
+        for message in read(path, self.gives):
+            if isinstance(message, Keyframe):
+                keyframes += 1
+                last = LastKeyframe(frame_id=message.frame_id, stamp_ns=message.stamp_ns, keyframes=keyframes)
+            yield message
+        if ends:
+            yield last
+
+
+def _require_keyframes(path: Path, counts: dict[str, int]) -> None:
+    if counts.get("Keyframe", 0):
+        return
+    if counts.get("Frame", 0):
+        raise SourceError(f"{path}: has no Keyframe but {counts['Frame']} Frame messages: read it as a camera's source")
+    raise SourceError(f"{path}: has no Keyframe, only: {', '.join(counts) or 'nothing'}")
+
+
+NODE = Playback

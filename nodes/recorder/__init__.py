@@ -1,0 +1,100 @@
+"""Node `recorder`: every recorded message into a Rerun file or a live viewer, exactly, and drawn for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from placegraph.nodes.recorder import images, numbers, places, space
+from placegraph.nodes.recorder.blueprint import opening_view
+from placegraph.nodes.recorder.picture import Picture
+from placegraph.runtime import messages as m
+from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.node import Context, Node, NodeConfig
+from placegraph.runtime.recording import RecordingWriter, images_of
+from placegraph.runtime.topics import TOPICS
+
+RECORDED = tuple(topic.kind for topic in TOPICS.values() if topic.recorded)
+# A kind without an entry is recorded but not drawn.
+DRAWN: dict[type[m.Message], Callable[[Picture, Any, dict[str, bytes]], None]] = {
+    m.Frame: images.draw_frame,
+    m.Pose: space.draw_pose,
+    m.Keyframe: images.draw_keyframe,
+    m.Tags: images.draw_tags,
+    m.Detections: images.draw_detections,
+    m.Segments: images.draw_segments,
+    m.Map: space.draw_map,
+    m.Graph: places.draw_graph,
+    m.Question: places.draw_question,
+    m.Answer: places.draw_answer,
+    m.Health: numbers.draw_health,
+}
+
+
+class RecorderConfig(NodeConfig):
+    """Settings of `recorder`."""
+
+    file: str = "run.rrd"  # in the run's folder; "": no file
+    viewer_port: int = Field(default=0, ge=0, le=65535)  # a Rerun viewer may connect to 127.0.0.1 here; 0: none
+    frames: bool = False  # keep every camera frame too, about 0.5 MB each at 640x480, so that all can be run again
+
+
+class Recorder(Node):
+    """Writes what it takes, gives nothing."""
+
+    config_type: ClassVar[type[NodeConfig]] = RecorderConfig
+    takes = RECORDED
+
+    def __init__(self, config: RecorderConfig, context: Context) -> None:
+        super().__init__(config, context)
+        if config.file and (Path(config.file).name != config.file or not config.file.endswith(".rrd")):
+            raise ConfigError(
+                f"[nodes.recorder] file: expected a name in the run's folder like run.rrd: {config.file!r}"
+            )
+        if not config.file and not config.viewer_port:
+            raise ConfigError("[nodes.recorder] file is empty and viewer_port is 0: nothing would be recorded or shown")
+        self.takes = (m.Frame, *RECORDED) if config.frames else RECORDED
+        self._writer: RecordingWriter | None = None
+        self._picture: Picture | None = None
+
+    def start(self) -> None:
+        """Open the file and the port; raises ConfigError when one of them cannot be opened."""
+        if self.config.file and not self.context.out_dir:
+            raise ConfigError("[nodes.recorder] file: this run has no folder to record into")
+        folder = Path(self.context.out_dir)
+        self._writer = RecordingWriter(
+            folder / self.config.file if self.config.file else None,
+            run_id=folder.name or "placegraph",
+            properties={"placegraph": version("placegraph"), "frames": str(self.config.frames).lower()},
+            viewer_port=self.config.viewer_port,
+            blueprint=opening_view(self.config.frames),
+        )
+        self._picture = Picture(self._writer.stream, self.config.frames)
+        space.draw_world(self._picture)
+
+    def step(self, message: m.Message) -> Sequence[m.Message]:
+        """Write and draw one message. Raises SchemaError for a message that is not what it declares."""
+        if self._writer is None or self._picture is None:
+            raise RuntimeError("recorder: step before start")
+        if self.config.file:
+            pngs = self._writer.write(message)
+        else:
+            message.check()
+            pngs = images_of(message)
+            self._writer.set_time(message)
+        if draw := DRAWN.get(type(message)):
+            draw(self._picture, message, pngs)
+        return ()
+
+    def stop(self) -> None:
+        """Write what is pending and close; the file is readable from here on."""
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+
+NODE = Recorder

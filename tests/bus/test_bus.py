@@ -1,0 +1,75 @@
+import threading
+
+import psutil
+import pytest
+
+from placegraph.runtime.bus import Bus, BusConfig, Request
+from placegraph.runtime.errors import ConfigError, QueryError
+
+pytestmark = pytest.mark.bus
+
+
+def test_hub_and_clients_exchange_messages_in_order(bus_config, wait_until) -> None:
+    with Bus(bus_config, hub=True) as hub, Bus(bus_config) as giver, Bus(bus_config) as taker:
+        got: list[tuple[bytes, bytes]] = []
+        taker.subscribe(lambda key, payload, attachment: got.append((payload, attachment)), "topic", "x")
+        taker.declare_alive("taker")
+        present = threading.Event()
+        giver.watch_alive(lambda name, alive: present.set() if name == "taker" and alive else None)
+        put = giver.publisher("topic", "x")
+        assert present.wait(10)
+        for i in range(50):
+            put(bytes([i]) * 100_000, i.to_bytes(8))
+        wait_until(lambda: len(got) == 50, "50 messages")
+        assert [int.from_bytes(attachment) for _, attachment in got] == list(range(50))
+        assert hub.config is bus_config
+
+
+def test_only_the_given_loopback_endpoint_listens(bus_config) -> None:
+    before = {c.laddr for c in psutil.Process().net_connections("inet") if c.status in ("LISTEN", "NONE")}
+    with Bus(bus_config, hub=True), Bus(bus_config):
+        now = {c.laddr for c in psutil.Process().net_connections("inet") if c.status in ("LISTEN", "NONE")}
+    opened = now - before
+    assert {(ip, port) for ip, port in opened} == {("127.0.0.1", int(bus_config.endpoint.rsplit(":")[-1]))}
+
+
+def test_second_hub_on_one_endpoint_is_refused(bus_config) -> None:
+    with Bus(bus_config, hub=True), pytest.raises(ConfigError, match="is taken, another run may be up"):
+        Bus(bus_config, hub=True)
+
+
+def test_unusable_endpoint_is_named() -> None:
+    with pytest.raises(ConfigError, match=r"\[bus\] endpoint: cannot listen on nonsense/1"):
+        Bus(BusConfig(endpoint="nonsense/1"), hub=True)
+
+
+def test_nobody_there(bus_config, monkeypatch) -> None:
+    monkeypatch.setattr("placegraph.runtime.bus.CONNECT_TIMEOUT_MS", 300)
+    with pytest.raises(ConfigError, match="cannot reach a running placegraph at"):
+        Bus(bus_config)
+
+
+def test_questions_and_replies(bus_config) -> None:
+    def on_request(request: Request) -> None:
+        if request.payload == b"bad":
+            request.fail(b"no")
+        elif request.payload != b"silent":
+            request.reply(b"re:" + request.payload)
+            request.reply(b"ignored")
+        else:
+            kept.append(request)
+
+    kept: list[Request] = []
+    with Bus(bus_config, hub=True), Bus(bus_config) as server, Bus(bus_config) as asker:
+        with pytest.raises(QueryError, match="nobody answers"):
+            asker.ask(b"x", 1.0, "ask")
+        server.serve(on_request, "ask")
+        server.declare_alive("server")
+        ready = threading.Event()
+        asker.watch_alive(lambda name, alive: ready.set())
+        assert ready.wait(10)
+        assert asker.ask(b"x", 5.0, "ask") == b"re:x"
+        assert asker.ask(b"bad", 5.0, "ask") == b"no"
+        with pytest.raises(QueryError, match="no reply within 0.3 s"):
+            asker.ask(b"silent", 0.3, "ask")
+        kept[0].reply(b"late")  # harmless: nobody waits any more

@@ -1,0 +1,36 @@
+import pytest
+
+from placegraph.models_onnx import Detector, InstanceSegmenter, Segmenter, Tagger
+from placegraph.models_onnx.load import load, wrong_task
+from placegraph.runtime.errors import ConfigError, ModelError
+
+
+def test_each_family_implements_its_tasks(tiny, tmp_path):
+    tiny.write_models(tmp_path)
+    tasks = (Tagger, Detector, Segmenter, InstanceSegmenter)
+    found = {
+        name: [task for task in tasks if isinstance(load(name, [tmp_path]), task)]
+        for name in ("tiny_tags", "tiny_boxes", "tiny_instances", "tiny_sam")
+    }
+    assert found == {
+        "tiny_tags": [Tagger],
+        "tiny_boxes": [Detector],
+        "tiny_instances": [Detector, Segmenter, InstanceSegmenter],
+        "tiny_sam": [Segmenter],
+    }
+
+
+def test_an_unknown_family_or_name_is_an_error(tiny, tmp_path):
+    tiny.write_models(tmp_path)
+    path = tmp_path / "manifest.toml"
+    path.write_text(path.read_text().replace('"classifier"', '"clasifier"'))
+    with pytest.raises(ConfigError, match="no model family named 'clasifier'"):
+        load("tiny_tags", [tmp_path])
+    with pytest.raises(ModelError, match="no weights named 'tiny'"):
+        load("tiny", [tmp_path])
+
+
+def test_a_network_for_another_task_is_named(tiny, tmp_path):
+    tiny.write_models(tmp_path)
+    error = wrong_task("tagger", "tiny_sam", load("tiny_sam", [tmp_path]), "tag images")
+    assert str(error) == "[nodes.tagger] model: 'tiny_sam' is of family 'sam', which cannot tag images"

@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from placegraph.nodes.camera import _folder
+from placegraph.runtime.errors import ConfigError, SourceError
+
+
+class Settings(_folder.SourceSettings):
+    rate_hz: float = 30.0
+
+
+def encode(image: np.ndarray, ending: str) -> bytes:
+    return cv2.imencode(ending, image)[1].tobytes()
+
+
+NOISE = np.random.default_rng(0).integers(0, 255, (40, 50, 3), np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [({"rate": 1.0}, r"\[nodes.camera.settings\] rate: Extra"), ({"rate_hz": "fast"}, "rate_hz: .*number")],
+)
+def test_settings_errors_name_the_key(settings: dict[str, object], text: str):
+    with pytest.raises(ConfigError, match=text):
+        _folder.read_settings(Settings, settings)
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg"])
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.97])
+def test_truncated_images_are_refused_by_name(tmp_path: Path, ending: str, share: float):
+    data = encode(NOISE, ending)
+    file = tmp_path / f"cut{ending}"
+    file.write_bytes(data[: int(len(data) * share)])
+    with pytest.raises(SourceError, match=rf"cut\{ending}: not a whole image"):
+        _folder.read_color(file)
+
+
+def test_absent_image_is_named(tmp_path: Path):
+    with pytest.raises(SourceError, match=r"none\.png: cannot be read: No such file"):
+        _folder.read_color(tmp_path / "none.png")
+
+
+def test_color_comes_as_rgb(tmp_path: Path):
+    file = tmp_path / "a.png"
+    file.write_bytes(encode(NOISE, ".png"))
+    assert np.array_equal(_folder.read_color(file), NOISE[..., ::-1])
+
+
+@pytest.mark.parametrize("image", [np.zeros((4, 5), np.uint8), np.zeros((4, 5, 3), np.uint16)])
+def test_depth_of_another_kind_is_refused(tmp_path: Path, image: np.ndarray):
+    file = tmp_path / "d.png"
+    file.write_bytes(encode(image, ".png"))
+    with pytest.raises(SourceError, match=r"d\.png: depth must be 16 bit of one channel"):
+        _folder.read_depth(file)
+
+
+def test_a_pair_of_two_sizes_is_refused(tmp_path: Path):
+    (tmp_path / "c.png").write_bytes(encode(NOISE, ".png"))
+    (tmp_path / "d.png").write_bytes(encode(np.zeros((20, 25), np.uint16), ".png"))
+    with pytest.raises(SourceError, match=r"d\.png: depth is 25x20, its colour image is 50x40"):
+        _folder.read_pair(tmp_path / "c.png", tmp_path / "d.png")
+
+
+@pytest.mark.parametrize("text", ["", "1 2 3", "1 2 3 4 5", "1 2 three 4"])
+def test_numbers_that_do_not_fit_are_refused(tmp_path: Path, text: str):
+    file = tmp_path / "k.txt"
+    file.write_text(text)
+    with pytest.raises(SourceError, match=r"k\.txt: expected fx fy cx cy \(4 numbers\)"):
+        _folder.read_numbers(file, (4,), "fx fy cx cy")
+
+
+def test_text_that_is_not_utf8_is_refused(tmp_path: Path):
+    file = tmp_path / "k.txt"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SourceError, match=r"k\.txt: cannot be read"):
+        _folder.read_text(file)
+
+
+@pytest.mark.parametrize(
+    "values", [(0.0, 5.0, 5.0, 5.0), (-5.0, 5.0, 5.0, 5.0), (5.0, np.nan, 5.0, 5.0), (5.0, 5.0, np.inf, 5.0)]
+)
+def test_intrinsics_must_be_positive_and_finite(values: tuple[float, ...]):
+    with pytest.raises(SourceError, match="here: fx fy cx cy must be four positive numbers"):
+        _folder.check_intrinsics(np.array(values), "here")
+
+
+@pytest.mark.parametrize("centre", [(50.0, 20.0), (25.0, 40.0), (640.0, 480.0)])
+def test_principal_point_outside_the_image_is_refused(centre: tuple[float, float]):
+    with pytest.raises(SourceError, match=r"here: the principal point .* is outside the 50x40 image"):
+        _folder.check_centre(np.array([40.0, 40.0, *centre]), (40, 50), "here")
+
+
+def test_principal_point_inside_is_accepted():
+    _folder.check_centre(np.array([40.0, 40.0, 24.5, 19.5]), (40, 50), "here")

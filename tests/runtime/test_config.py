@@ -1,0 +1,78 @@
+from pathlib import Path
+
+import pytest
+
+from placegraph.runtime.config import build, read
+from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.messages import Frame, Keyframe, Pose, Segments
+
+CAMERA = '[nodes.camera]\nsource = "synthetic"\n'
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "flow.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", r"\[nodes\] : Field required"),
+        ("[nodes", "flow.toml: "),
+        ("[run]\nthreds = 2\n[nodes.camera]", r"\[run\] threds: Extra inputs are not permitted"),
+        ('[bus]\nmulticast = "yes"\n[nodes.camera]', r"\[bus\] multicast: Input should be a valid boolean"),
+        ("[extra]\n[nodes.camera]", r"\[extra\] : Extra inputs"),
+    ],
+)
+def test_bad_files_name_the_key(tmp_path: Path, text: str, problem: str) -> None:
+    with pytest.raises(ConfigError, match=problem):
+        read(written(tmp_path, text))
+
+
+def test_absent_file_lists_those_that_come_with_placegraph(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no such dataflow file; with placegraph come: .*replay.toml"):
+        read(tmp_path / "nothing.toml")
+    assert read(Path("configs/replay.toml")).nodes.keys() >= {"camera", "fusion"}
+    assert read(Path("replay.toml")).nodes == read(Path("configs/replay.toml")).nodes
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("[nodes.pose]", "expected one source .*, found none"),
+        (CAMERA + "[nodes.pos]", "no node named 'pos'; there are: .*pose"),
+        (CAMERA + "[nodes.pose]\ngian = 1", r"\[nodes.pose\] gian: Extra inputs are not permitted"),
+        (CAMERA + '[nodes.pose]\nstride = "4"', r"\[nodes.pose\] stride: Input should be a valid integer"),
+        (CAMERA + "[nodes.pose]\nvoxel_m = 0.0", r"\[nodes.pose\] voxel_m: Input should be greater than 0"),
+        (CAMERA + "[nodes.keyframe]", "keyframe takes Pose, which nothing gives"),
+        (
+            CAMERA + '[nodes.pose]\n[nodes.keyframe]\n[nodes.tagger]\nmodel="a"\n[nodes.instances]\nmodel="b"\n'
+            '[nodes.detector]\nmodel="c"',
+            "Detections is given by",
+        ),
+    ],
+)
+def test_bad_settings_and_wiring(tmp_path: Path, text: str, problem: str) -> None:
+    with pytest.raises(ConfigError, match=problem):
+        build(read(written(tmp_path, text)))
+
+
+def test_a_missing_data_set_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="nowhere"):
+        build(read(written(tmp_path, '[nodes.camera]\npath = "/nowhere"')))
+
+
+def test_order_waits_and_model_folders(tmp_path: Path) -> None:
+    text = '[run]\nmodel_dirs = ["weights"]\n' + CAMERA
+    text += '[nodes.instances]\nmodel = "x"\n[nodes.keyframe]\n[nodes.pose]\n'
+    flow = build(read(written(tmp_path, text)))
+    assert list(flow.nodes) == ["camera", "pose", "keyframe", "instances"]
+    assert flow.context.lossless and flow.context.model_dirs == (str(tmp_path / "weights"),)
+    assert flow.giver(Pose) == "pose" and flow.takers(Frame) == ["pose", "keyframe"]
+    assert flow.takers(Segments) == ["keyframe"] and flow.waited_for("instances")["Segments"] == []
+    assert flow.waited_for("keyframe")["Keyframe"] == ["instances"] and flow.takers(Keyframe) == ["instances"]
+
+
+def test_a_data_set_in_real_time_is_live(tmp_path: Path) -> None:
+    assert not build(read(written(tmp_path, CAMERA + "realtime = true"))).context.lossless

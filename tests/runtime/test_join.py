@@ -1,0 +1,42 @@
+import itertools
+
+import numpy as np
+
+from placegraph.runtime.join import Join
+from placegraph.runtime.messages import LastKeyframe, Message, Tags
+
+
+def tags(i: int) -> Tags:
+    return Tags(frame_id=i, stamp_ns=0, names=(), scores=np.zeros(0, np.float32))
+
+
+def last(i: int) -> LastKeyframe:
+    return LastKeyframe(frame_id=i, stamp_ns=0, keyframes=0)
+
+
+def test_nothing_until_complete() -> None:
+    join = Join(Tags, LastKeyframe)
+    assert join.add(tags(0)) is None
+    assert join.add(last(1)) is None
+    assert len(join) == 2
+    found = join.add(last(0))
+    assert found is not None and [type(x) for x in found] == [Tags, LastKeyframe]
+
+
+def test_output_does_not_depend_on_how_inputs_interleave() -> None:
+    results = set()
+    for places in itertools.combinations(range(6), 3):  # where the three Tags stand among six messages, each in order
+        a, b = iter([tags(i) for i in range(3)]), iter([last(i) for i in range(3)])
+        inputs: list[Message] = [next(a) if i in places else next(b) for i in range(6)]
+        join = Join(Tags, LastKeyframe)
+        results.add(tuple(found[0].frame_id for x in inputs if (found := join.add(x)) is not None))
+        assert len(join) == 0
+    assert results == {(0, 1, 2)}
+
+
+def test_what_was_lost_is_forgotten_when_a_later_frame_completes() -> None:
+    join = Join(Tags, LastKeyframe)
+    join.add(tags(0))
+    join.add(tags(1))
+    assert join.add(last(1)) is not None
+    assert len(join) == 0

@@ -1,0 +1,36 @@
+"""Check a dataflow file: settings, wiring, model files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from placegraph.runtime.config import build, read
+from placegraph.tools.run import with_settings
+
+
+def check(
+    config: Annotated[Path, typer.Argument(metavar="CONFIG", help="A dataflow file.")],
+    source: Annotated[Path | None, typer.Option(help="Data set folder or recording to check it with.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the effective settings as JSON.")] = False,
+) -> None:
+    """Build every node without running it, load its models, and print the effective settings."""
+    settings = with_settings(read(config), {"camera": {"path": str(source)}} if source else {})
+    dataflow = build(settings)
+    for node in dataflow.nodes.values():
+        try:
+            node.start()
+        finally:
+            node.stop()
+    effective = {name: node.config.model_dump(mode="json") for name, node in dataflow.nodes.items()}
+    if as_json:
+        print(json.dumps({"run": settings.run.model_dump(), "bus": settings.bus.model_dump(), "nodes": effective}))
+        return
+    print(f"{config}: {len(effective)} nodes, {'replay' if dataflow.context.lossless else 'live'}")
+    for name, values in effective.items():
+        print(f"[nodes.{name}]")
+        for key, value in values.items():
+            print(f"  {key} = {json.dumps(value)}")

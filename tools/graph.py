@@ -1,0 +1,81 @@
+"""Print the dataflow table (from the code), or the scene graph of a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from placegraph.runtime.messages import Message
+from placegraph.runtime.node import NODES, Node, available, plugin
+from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.runtime.topics import TOPICS
+from placegraph.tools.map_folder import find_graph
+
+
+def graph(
+    map_folder: Annotated[Path | None, typer.Argument(metavar="[MAP]", help="Print this map's graph instead.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the graph's canonical JSON.")] = False,
+) -> None:
+    """Print which node takes and gives which message; with MAP, its building, floors, rooms, locations, objects."""
+    if map_folder is None:
+        print(dataflow_table())
+        print()
+        print(topic_table())
+        return
+    found = SceneGraph.load(find_graph(map_folder))
+    print(found.to_json() if as_json else tree(found))
+
+
+def node_types() -> dict[str, type[Node]]:
+    """Every node class by name, in the order of the dataflow (givers before takers, by name otherwise)."""
+    types: dict[str, type[Node]] = {name: plugin(NODES, name, "NODE", "node") for name in available(NODES)}
+    order: list[str] = []
+    waiting = sorted(types)
+    while waiting:
+        for name in waiting:
+            needed = {k for k in types[name].takes if k not in types[name].feedback}
+            if not any(k in types[other].gives for k in needed for other in waiting if other != name):
+                break
+        order.append(name)
+        waiting.remove(name)
+    return {name: types[name] for name in order}
+
+
+def _names(kinds: tuple[type[Message], ...], feedback: tuple[type[Message], ...] = ()) -> str:
+    return ", ".join(f"{k.__name__} (feedback)" if k in feedback else k.__name__ for k in kinds) or "nothing"
+
+
+def dataflow_table() -> str:
+    """Markdown table of the nodes."""
+    rows = ["| node | takes | gives |", "|---|---|---|"]
+    rows += [f"| {n} | {_names(t.takes, t.feedback)} | {_names(t.gives)} |" for n, t in node_types().items()]
+    return "\n".join(rows)
+
+
+def topic_table() -> str:
+    """Markdown table of the topics."""
+    rows = ["| message | key | delivery | giver waits when ahead by | recorded |", "|---|---|---|---|---|"]
+    for topic in TOPICS.values():
+        window = str(topic.window) if topic.window else "never waits"
+        recorded = "yes" if topic.recorded else "no"
+        rows.append(f"| {topic.kind.__name__} | {topic.key} | {topic.delivery} | {window} | {recorded} |")
+    return "\n".join(rows)
+
+
+def tree(graph: SceneGraph) -> str:
+    """The hierarchy as indented lines: id, name, tags with weights, centre and size."""
+    lines: list[str] = []
+
+    def add(node_id: str, depth: int) -> None:
+        node = graph.nodes[node_id]
+        size = node.box[1] - node.box[0]
+        tags = ", ".join(f"{tag.name} {tag.weight:.2f}" for tag in node.tags[:3])
+        where = f"at ({', '.join(f'{v:.2f}' for v in node.center)}) size ({', '.join(f'{v:.2f}' for v in size)}) m"
+        lines.append(f"{'  ' * depth}{node.id:<5}{tags or node.layer}  {where}")
+        for child in graph.children(node_id):
+            add(child.id, depth + 1)
+
+    add(graph.building.id, 0)
+    return "\n".join(lines)

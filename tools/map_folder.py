@@ -1,0 +1,189 @@
+"""What a run leaves behind: graph.json, cloud.ply, objects.ply, trajectory.txt (TUM), run.json; and reading it back."""
+
+from __future__ import annotations
+
+import json
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.runtime.config import Dataflow, RunConfig
+from placegraph.runtime.errors import ConfigError, SchemaError
+from placegraph.runtime.geometry import quaternion_xyzw
+from placegraph.runtime.messages import End, Graph, Map, Message, PlaceNames, Pose
+from placegraph.runtime.scene_graph import SceneGraph
+
+GRAPH, CLOUD, OBJECTS, TRAJECTORY, RUN = "graph.json", "cloud.ply", "objects.ply", "trajectory.txt", "run.json"
+PACKAGES = (
+    "placegraph",
+    "numpy",
+    "scipy",
+    "opencv-python-headless",
+    "onnxruntime",
+    "kiss-icp",
+    "eclipse-zenoh",
+    "rerun-sdk",
+)
+
+
+class Collector:
+    """Keeps what the map folder needs out of the messages of a run."""
+
+    def __init__(self, dataflow: Dataflow) -> None:
+        self._expects_graph = dataflow.giver(Graph) is not None
+        self._expects_names = dataflow.giver(PlaceNames) is not None
+        self.ended = False
+        self.poses: list[Pose] = []
+        self.map: Map | None = None
+        self.graph: Graph | None = None
+
+    def add(self, message: Message) -> None:
+        """Take any message; keeps poses, the newest map and the newest graph."""
+        if isinstance(message, Pose):
+            self.poses.append(message)
+        elif isinstance(message, Map):
+            self.map = message
+        elif isinstance(message, Graph):
+            self.graph = message
+        elif isinstance(message, End):
+            self.ended = True
+
+    @property
+    def complete(self) -> bool:
+        """The last graph of the run is here, with its names if any are to come; without a graph, the source's end."""
+        if not self._expects_graph:
+            return self.ended
+        return self.graph is not None and self.graph.final and (self.graph.named or not self._expects_names)
+
+    def write(self, folder: Path) -> None:
+        """Write what there is; geometry and graph are left out when no map came."""
+        folder.mkdir(parents=True, exist_ok=True)
+        write_trajectory(folder / TRAJECTORY, self.poses)
+        if self.map is not None:
+            _write_ply(folder / CLOUD, self.map.points_world, {"rgb": self.map.point_colors})
+            ids = np.repeat(self.map.object_ids, np.diff(self.map.object_point_offsets)).astype(np.int32)
+            _write_ply(folder / OBJECTS, self.map.object_points_world, {"object": ids})
+        if self.graph is not None:
+            SceneGraph.from_json(self.graph.json).save(folder / GRAPH)
+
+
+def prepare(folder: Path) -> None:
+    """Make an empty folder for a run; raises ConfigError rather than mixing two runs."""
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        raise ConfigError(f"{folder}: exists and is not an empty folder; choose another --out or remove it")
+    folder.mkdir(parents=True, exist_ok=True)
+
+
+def next_folder(base: Path, name: str) -> Path:
+    """`base/name-001`, or the next number that is free."""
+    number = 1
+    while (folder := base / f"{name}-{number:03d}").exists():
+        number += 1
+    return folder
+
+
+def write_run(folder: Path, config: RunConfig, effective: dict[str, Any], summary: dict[str, Any]) -> None:
+    """Write run.json: effective settings, versions, commit and the run's numbers."""
+    record = {
+        "config": config.model_dump(mode="json"),
+        "effective": effective,
+        "versions": {name: _version(name) for name in PACKAGES} | {"python": platform.python_version()},
+        "commit": _commit(),
+        "summary": summary,
+    }
+    (folder / RUN).write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """Read run.json; raises SchemaError."""
+    try:
+        record: dict[str, Any] = json.loads((folder / RUN).read_text())
+    except (OSError, json.JSONDecodeError) as error:
+        raise SchemaError(f"{folder / RUN}: cannot read: {error}") from None
+    return record
+
+
+def find_graph(path: Path) -> Path:
+    """The graph file of a map folder, or the path itself if it is a file; raises SchemaError."""
+    found = path / GRAPH if path.is_dir() else path
+    if not found.is_file():
+        raise SchemaError(
+            f"{path}: no {GRAPH} here; expected a map folder that `placegraph run` wrote, or a graph file"
+        )
+    return found
+
+
+def write_trajectory(path: Path, poses: list[Pose]) -> None:
+    """TUM format: `seconds x y z qx qy qz qw` for each trusted pose, world_from_camera, by time."""
+    lines = []
+    for pose in sorted((p for p in poses if p.trusted), key=lambda pose: pose.frame_id):
+        x, y, z = pose.world_from_camera[:3, 3]
+        quaternion = quaternion_xyzw(pose.world_from_camera[:3, :3])
+        seconds = f"{pose.stamp_ns // 10**9}.{pose.stamp_ns % 10**9:09d}"
+        lines.append(" ".join([seconds, *(f"{v:.6f}" for v in (x, y, z, *quaternion))]))
+    path.write_text("# seconds tx ty tz qx qy qz qw\n" + "".join(line + "\n" for line in lines))
+
+
+def read_trajectory(path: Path) -> dict[int, NDArray[np.float64]]:
+    """TUM file to stamp_ns -> (3,) position in metres; raises SchemaError naming the line."""
+    found: dict[int, NDArray[np.float64]] = {}
+    try:
+        text = path.read_text()
+    except OSError as error:
+        raise SchemaError(f"{path}: cannot read: {error}") from None
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        try:
+            stamp, *numbers = line.split()
+            seconds, _, fraction = stamp.partition(".")
+            position = np.array(numbers, float)
+            if position.shape != (7,) or not np.isfinite(position).all():
+                raise ValueError("expected 8 finite numbers")
+            found[int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)] = position[:3]
+        except ValueError as error:
+            raise SchemaError(f"{path}:{number}: {error}") from None
+    return found
+
+
+def _write_ply(path: Path, xyz: NDArray[np.float32], extra: dict[str, NDArray[Any]]) -> None:
+    """Binary PLY of points with either colours (N, 3) uint8 as `rgb` or object ids (N,) int32 as `object`."""
+    fields: list[tuple[str, str]] = [("x", "<f4"), ("y", "<f4"), ("z", "<f4")]
+    names = ["float x", "float y", "float z"]
+    if "rgb" in extra:
+        fields += [("red", "u1"), ("green", "u1"), ("blue", "u1")]
+        names += ["uchar red", "uchar green", "uchar blue"]
+    else:
+        fields.append(("object", "<i4"))
+        names.append("int object")
+    rows = np.zeros(len(xyz), np.dtype(fields))
+    for i, axis in enumerate("xyz"):
+        rows[axis] = xyz[:, i]
+    if "rgb" in extra:
+        for i, channel in enumerate(("red", "green", "blue")):
+            rows[channel] = extra["rgb"][:, i]
+    else:
+        rows["object"] = extra["object"]
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
+    header += [f"property {name}" for name in names] + ["end_header", ""]
+    path.write_bytes("\n".join(header).encode() + rows.tobytes())
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _commit() -> str:
+    here = Path(__file__).resolve().parent
+    found = subprocess.run(
+        ["git", "-C", str(here), "describe", "--always", "--dirty"], capture_output=True, text=True, check=False
+    )
+    return found.stdout.strip() if found.returncode == 0 else "not from a checkout"

@@ -1,0 +1,101 @@
+"""What a person sees while a dataflow runs: a table of the nodes, and the numbers at the end."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from placegraph.runtime.config import Dataflow
+from placegraph.runtime.messages import Health
+from placegraph.runtime.topics import TOPICS
+
+PLAIN_PERIOD_S = 5.0  # without a terminal: a line this often
+MIN_RATE_SHARE = 0.9  # of a topic's declared rate; below it a live node is marked
+
+
+class Progress:
+    """Live table on a terminal, a line every few seconds elsewhere, nothing when quiet. Use as a context manager."""
+
+    def __init__(self, dataflow: Dataflow, quiet: bool) -> None:
+        self._dataflow, self._quiet = dataflow, quiet
+        self._console = Console(stderr=True)
+        self._health: dict[str, Health] = {}
+        self._live = Live(console=self._console, auto_refresh=False, transient=True)
+        self._last_line = time.monotonic()
+
+    def __enter__(self) -> Progress:
+        if not self._quiet and self._console.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._live.is_started:
+            self._live.stop()
+
+    def add(self, health: Health) -> None:
+        """Take one node's newest report."""
+        self._health[health.node] = health
+
+    def say(self, text: str) -> None:
+        """Print a line beside the table."""
+        self._console.print(text, highlight=False)
+
+    def refresh(self) -> None:
+        """Show the newest reports."""
+        if self._quiet or not self._health:
+            return
+        if self._live.is_started:
+            self._live.update(self._table(), refresh=True)
+        elif time.monotonic() - self._last_line >= PLAIN_PERIOD_S:
+            self._last_line = time.monotonic()
+            steps = [f"{name} {self._health[name].steps}" for name in self._dataflow.nodes if name in self._health]
+            self.say("  ".join(steps))
+
+    def _table(self) -> Table:
+        table = Table(
+            "node", *(_right(title) for title in ("steps", "per s", "p50 ms", "p95 ms", "waiting", "dropped", "MB"))
+        )
+        for name in self._dataflow.nodes:
+            h = self._health.get(name)
+            if h is None:
+                table.add_row(name, *["-"] * 7)
+                continue
+            rate = f"[yellow]{h.rate_hz:.1f}[/]" if self._is_slow(name, h) else f"{h.rate_hz:.1f}"
+            drops = f"[red]{h.drops}[/]" if h.drops else "0"
+            times = f"{h.step_p50_ms:.1f}", f"{h.step_p95_ms:.1f}"
+            table.add_row(name, str(h.steps), rate, *times, str(h.queue), drops, f"{h.memory_mb:.0f}")
+        return table
+
+    def _is_slow(self, name: str, health: Health) -> bool:
+        if self._dataflow.context.lossless:  # a replay goes as fast as it can; no rate is expected of it
+            return False
+        wanted = max((TOPICS[kind].rate_hz for kind in self._dataflow.nodes[name].gives), default=0.0)
+        return health.rate_hz < MIN_RATE_SHARE * wanted
+
+    def print_summary(self, summary: dict[str, Any]) -> None:
+        """Numbers of the whole run, on standard output."""
+        console = Console(highlight=False)
+        table = Table("node", *(_right(title) for title in ("steps", "p50 ms", "p95 ms", "dropped", "MB")))
+        for name, n in summary["nodes"].items():
+            table.add_row(name, *(str(n[key]) for key in ("steps", "p50_ms", "p95_ms", "drops", "memory_mb")))
+        console.print(table)
+        console.print(
+            f"{summary['frames']} frames ({summary['keyframes']} keyframes, {summary['untrusted_poses']} poses untrusted)"
+            f" in {summary['seconds']} s: {summary['frames_per_s']} frames per second, start and stop included"
+        )
+        if summary["trajectory"]:
+            console.print(
+                "trajectory: ATE rmse {ate_rmse_m} m, max {ate_max_m} m over {path_m} m".format(**summary["trajectory"])
+            )
+        if "graph" in summary:
+            console.print("graph: " + ", ".join(f"{count} {layer}s" for layer, count in summary["graph"].items()))
+
+
+def _right(title: str) -> Any:
+    from rich.table import Column
+
+    return Column(title, justify="right")

@@ -1,0 +1,35 @@
+"""Record a camera: every frame exactly, nothing else; map it later."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from placegraph.runtime.config import read
+from placegraph.runtime.errors import ConfigError
+from placegraph.tools.run import run_dataflow, with_settings
+
+
+def record(
+    config: Annotated[
+        Path, typer.Argument(metavar="CONFIG", help="A dataflow file with a camera; its other nodes stay off.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the recording (run.rrd).")],
+    source: Annotated[Path | None, typer.Option(help="Data set folder, for a camera that reads one.")] = None,
+    limit: Annotated[int, typer.Option(min=0, help="Stop after so many frames (0: all, or until Ctrl-C).")] = 0,
+    quiet: Annotated[bool, typer.Option(help="No progress table.")] = False,
+) -> None:
+    """Record a camera's frames; `placegraph run CONFIG --source OUT/run.rrd` maps them later."""
+    settings = read(config)
+    if "camera" not in settings.nodes:
+        raise ConfigError(f"{config}: there is no [nodes.camera] to record")
+    nodes: dict[str, dict[str, Any]] = {
+        "camera": settings.nodes["camera"],
+        "recorder": settings.nodes.get("recorder", {}) | {"frames": True},
+    }
+    overrides: dict[str, Any] = ({"path": str(source)} if source else {}) | ({"limit": limit} if limit else {})
+    only_camera = with_settings(settings.model_copy(update={"nodes": nodes}), {"camera": overrides})
+    folder = run_dataflow(only_camera, config.stem, out, inline=False, quiet=quiet)
+    print(f"\nrecording  {folder / 'run.rrd'}")
