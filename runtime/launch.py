@@ -158,6 +158,8 @@ class Launcher:
                 stderr=subprocess.STDOUT,
                 env=environment,
             )
+        if (dead := self._processes.get(name)) is not None and dead.stdin is not None:
+            dead.stdin.close()
         self._processes[name] = process
         assert process.stdin is not None
         try:

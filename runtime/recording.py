@@ -32,8 +32,7 @@ CHECKSUM = "declaration_checksum"
 PROPERTIES = "placegraph"
 
 # departs: Rerun's 0.2 s writes five small chunks a second for each entity, 2.2 kB of headers each. Under load its timer
-# was seen to leave chunks pending for several seconds, so the writer also flushes by volume: what a killed process
-# loses is bounded by both, and a reader holds no more than that.
+# left chunks pending for seconds, so the writer also flushes by volume: that bounds what a killed process loses.
 FLUSH_S = 1.0
 CHUNK_BYTES = 1 << 20
 FLUSH_BYTES = 2 << 20
@@ -49,7 +48,7 @@ class RecordingWriter:
     """Writes messages into one Rerun stream: a file, a viewer's server on this machine, or both.
 
     `path` None writes no file; `viewer_port` 0 opens no socket, else a viewer may connect on 127.0.0.1. `properties`
-    (placegraph's version, settings) are readable with `properties`. `blueprint` is how the viewer opens.
+    are readable with `properties`. `blueprint` is how the viewer opens.
     Raises ConfigError when the file cannot be written or the port is taken.
     """
 
@@ -81,6 +80,7 @@ class RecordingWriter:
             self.stream.send_property(PROPERTIES, rr.AnyValues(**{k: pa.array([v]) for k, v in properties.items()}))
         self._sequence = 0
         self._unflushed = 0  # bytes
+        self._path, self._failed = path, False
         self._newest = (0, 0)  # frame id and capture time
 
     def set_time(self, message: Message) -> None:
@@ -94,7 +94,7 @@ class RecordingWriter:
     def write(self, message: Message) -> dict[str, bytes]:
         """Store every field bit for bit; returns the PNG of each image field, for whoever shows it.
 
-        Raises SchemaError when a field does not match its declaration, or an image is empty.
+        Raises SchemaError for a field against its declaration or an empty image, ConfigError when the disk is full.
         """
         message.check()
         kind, pngs = type(message), images_of(message)
@@ -116,7 +116,7 @@ class RecordingWriter:
         self._unflushed += sum(column.nbytes for column in columns.values())
         if self._unflushed > FLUSH_BYTES:
             self._unflushed = 0
-            self.stream.flush()
+            self._flush()
         entity = rr.DynamicArchetype(kind.__name__, components=columns)
         self.stream.log(f"{MESSAGES}/{kind.__name__}", entity, strict=True)
         self.stream.reset_time()  # what a person sees carries no sequence: there would be one row for each
@@ -124,9 +124,20 @@ class RecordingWriter:
         return pngs
 
     def close(self) -> None:
-        """Write what is pending, the footer, and let go of file and port."""
-        self.stream.flush()
-        self.stream.disconnect()
+        """Write what is pending, the footer, and let go of file and port; raises ConfigError if that fails."""
+        try:
+            if not self._failed:  # once is enough
+                self._flush()
+        finally:
+            self.stream.disconnect()
+
+    def _flush(self) -> None:
+        try:
+            self.stream.flush()
+        except RuntimeError as error:
+            self._failed = True
+            where = self._path or "the viewer's server"
+            raise ConfigError(f"{where}: cannot write the recording any further (is the disk full?): {error}") from None
 
 
 _ARROW = {int: pa.int64(), float: pa.float64(), bool: pa.bool_(), str: pa.string(), tuple[str, ...]: pa.string()}

@@ -32,6 +32,15 @@ STRUCTURE: tuple[tuple[Color, Span], ...] = (
     ((226, 221, 208), (4.0, 0.0, 0.0, 4.15, 1.4, CEILING_M)),  # between the rooms, beside the doorway
     ((226, 221, 208), (4.0, 2.4, 0.0, 4.15, 4.0, CEILING_M)),
     ((226, 221, 208), (4.0, 1.4, 2.05, 4.15, 2.4, CEILING_M)),  # above the doorway
+    # posts, beams and radiators: bare planes would leave odometry by shape nothing to hold on to
+    *(((216, 210, 196), (x, 0.0, 0.0, x + 0.25, 0.18, CEILING_M)) for x in (0.0, 1.3, 2.7, 3.75, 4.15, 5.2, 8.1, 8.9)),
+    *(((216, 210, 196), (x, 3.82, 0.0, x + 0.25, 4.0, CEILING_M)) for x in (0.7, 3.3, 4.15, 5.3, 7.9, 8.9)),
+    *(((216, 210, 196), (0.0, y, 0.0, 0.18, y + 0.25, CEILING_M)) for y in (0.7, 1.9, 2.8)),
+    *(((216, 210, 196), (3.85, y, 0.0, 4.3, y + 0.2, CEILING_M)) for y in (0.5, 1.2, 2.4, 3.3)),
+    *(((216, 210, 196), (8.97, y, 0.0, 9.15, y + 0.25, CEILING_M)) for y in (0.7, 2.4)),
+    *(((205, 201, 190), (x, 0.0, 2.28, x + 0.2, 4.0, CEILING_M)) for x in (0.5, 1.5, 2.5, 3.5, 4.7, 5.7, 6.7, 7.7, 8.7)),
+    *(((232, 232, 230), (x, 0.02, 0.15, x + 0.9, 0.16, 0.75)) for x in (1.65, 2.95, 4.35, 7.0)),
+    ((232, 232, 230), (8.99, 2.75, 0.15, 9.13, 3.2, 0.75)),
 )
 CLASSES = (
     "background", "book", "bookshelf", "cabinet", "chair", "cup", "lamp", "oven", "potted plant", "refrigerator",
@@ -137,17 +146,18 @@ OBJECTS: tuple[DrawnObject, ...] = (
 EYE_M = 1.2
 PITCH_RAD = -np.deg2rad(8.0)
 WALK = (  # x, y in metres and the heading in degrees (0 = east, counter-clockwise)
-    (3.45, 0.90, 150.0),
-    (3.40, 1.90, 180.0),
-    (3.35, 2.40, 205.0),
-    (3.30, 2.35, 270.0),
-    (3.50, 2.05, 330.0),
-    (4.60, 1.90, 355.0),
-    (5.40, 2.35, 335.0),
-    (6.40, 2.70, 350.0),
-    (7.40, 2.70, 400.0),
-    (7.80, 2.60, 460.0),
-    (7.90, 2.30, 525.0),
+    (3.25, 2.80, 215.0),
+    (3.45, 1.80, 180.0),
+    (3.40, 0.90, 140.0),
+    (3.20, 0.75, 90.0),
+    (3.20, 1.40, 50.0),
+    (3.70, 1.85, 10.0),
+    (4.80, 1.90, -10.0),
+    (5.40, 2.35, -25.0),
+    (6.40, 2.70, -10.0),
+    (7.40, 2.70, 40.0),
+    (7.80, 2.60, 100.0),
+    (7.90, 2.30, 165.0),
 )
 STEP_M, STEP_RAD = 0.05, np.deg2rad(3.0)  # the longest step and turn between two frames of the whole walk
 

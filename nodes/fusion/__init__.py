@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +121,7 @@ class FusionNode(Node):
         )
 
 
-def _object_fields(stable: list[Instance], lift_config: LiftConfig) -> dict[str, NDArray[np.generic] | tuple[str, ...]]:
+def _object_fields(stable: list[Instance], lift_config: LiftConfig) -> dict[str, Any]:
     solid = [i.solid(lift_config.cluster_eps_m, lift_config.cluster_min_points) for i in stable]
     points = [xyz for xyz, _ in solid]
     tags = [i.tags() for i in stable]

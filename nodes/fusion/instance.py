@@ -17,6 +17,7 @@ I64 = NDArray[np.int64]
 U8 = NDArray[np.uint8]
 
 TRIM_PERCENT = 0.5  # departs: per axis and side, what a box may lose to stray points
+REPEATED_SHARE = 0.2  # departs: of the views that its best seen points had, what a point needs
 MAIN_SHARE = 0.2  # departs: parts smaller than this share of the largest are leaks of masks onto the background
 
 
@@ -76,12 +77,15 @@ class Instance:
     def solid(self, eps: float, min_points: int) -> tuple[F32, U8]:
         """Points (M, 3) that can be believed and their median colour (3,).
 
-        Of three or more views, points that a single view claims go unless that would cost over half of them (it is seen
-        from all around); then parts far smaller than the main one; then `TRIM_PERCENT` at each end of each axis.
+        Of three or more views, points that few of them claim go unless that would cost over half (it is seen from all
+        around); then parts far smaller than the main one; then `TRIM_PERCENT` at each end of each axis.
         """
         if self._solid is None:
             kept = np.arange(len(self.points))
-            repeated = np.flatnonzero(self.values[:, 7] >= 2)
+            views = self.values[:, 7]
+            # colour and depth of most cameras are a few pixels apart: what masks drag in from behind changes with the
+            # viewpoint, the thing itself does not
+            repeated = np.flatnonzero(views >= max(2.0, REPEATED_SHARE * float(np.percentile(views, 90))))
             if self.observations >= 3 and 2 * len(repeated) >= len(kept):
                 kept = repeated
             kept = kept[_main_parts(self.points[kept], eps, min_points)]

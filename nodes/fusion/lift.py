@@ -1,8 +1,8 @@
 """Masks to 3D: what one view shows of one object.
 
-Source: paper, object layer; METHOD section 4. Departs: masks are eroded and lose depth edges before they are lifted, and
-what lies on a thing is cut out of its mask, since boxes inflated by edge points and tables that swallow the cup are the
-known failures of peers.
+Source: paper, object layer; METHOD section 4. Departs: masks are eroded and lose depth edges before they are lifted,
+and what lies on a thing is cut out of its mask, since boxes inflated by edge points and tables that swallow the cup are
+the known failures of peers.
 """
 
 from __future__ import annotations

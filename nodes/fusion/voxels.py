@@ -55,8 +55,8 @@ def sum_by_key(keys: I64, values: F64) -> tuple[I64, F64]:
 def depth_edges(depth_m: F32, ratio: float = 0.05) -> Bool:
     """Pixels beside a depth jump, where sensors invent points between the two surfaces ("flying pixels").
 
-    depth_m: (H, W) metres, 0 = no reading. A pixel is an edge when readings of its 3x3 neighbourhood differ by more than
-    `ratio` of the nearest one (departs: .05 keeps floors seen at a grazing angle up to 5 m). Returns (H, W) bool.
+    depth_m: (H, W) metres, 0 = no reading. A pixel is an edge when readings of its 3x3 neighbourhood differ by more
+    than `ratio` of the nearest one (departs: .05 keeps floors seen at a grazing angle up to 5 m). Returns (H, W) bool.
     """
     kernel = np.ones((3, 3), np.uint8)
     nearest = cv2.erode(np.where(depth_m > 0, depth_m, np.float32(np.inf)), kernel)
@@ -77,7 +77,7 @@ class VoxelMap:
 
     def add(self, xyz_world: Points, colors: U8) -> None:
         """Add points (N, 3) in metres with colours (N, 3). Raises SchemaError for points that are not finite."""
-        values = np.concatenate((xyz_world, colors, np.ones((len(xyz_world), 1))), axis=1)
+        values = np.concatenate((xyz_world, colors, np.ones((len(xyz_world), 1))), axis=1).astype(float)
         keys, sums = sum_by_key(pack(xyz_world, self.voxel_m), values)
         rows = np.array([self._rows.setdefault(key, len(self._rows)) for key in keys.tolist()], np.int64)
         if len(self._rows) > len(self._sums):

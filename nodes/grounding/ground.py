@@ -16,7 +16,7 @@ from placegraph.nodes.grounding.attributes import color_fit, size_fit
 from placegraph.nodes.grounding.names import STEP, Fit, Names
 from placegraph.nodes.grounding.program import Clause, Program, Thing
 from placegraph.nodes.grounding.relations import F64, Case, Verdict, Viewpoint, families, label
-from placegraph.nodes.grounding.select import Scope
+from placegraph.nodes.grounding.select import Scope, places_called
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
 TIE = 0.03  # departs: scores that differ by less do not tell two objects apart
@@ -87,7 +87,7 @@ class Grounder:
     def _targets(self, noun: str, scope: Scope, step: float) -> list[Fit]:
         """What the noun names in the scope: objects, or places where those bear the name better."""
         objects = self.names.named(noun, scope.objects, step)
-        places = self.names.named(noun, scope.places, step) if noun else []
+        places = places_called(noun, scope.places, self.names) if noun else []
         best = max((fit.score for fit in objects), default=0.0)
         return places if any(fit.score > best for fit in places) else objects
 
@@ -202,7 +202,9 @@ class Grounder:
         """Nodes an anchor can be: in the scope, else in the whole map, else a place."""
         everywhere = self.graph.layer("object")
         for nodes in (scope.objects, everywhere, scope.places):
-            candidates = [Candidate(fit.node, fit.score) for fit in self.names.named(thing.noun, nodes)]
+            is_places = nodes is scope.places
+            fits = places_called(thing.noun, nodes, self.names) if is_places else self.names.named(thing.noun, nodes)
+            candidates = [Candidate(fit.node, fit.score) for fit in fits]
             if candidates:
                 self._attributes(candidates, thing)
                 kept = [c for c in candidates if c.holds] or candidates

@@ -51,6 +51,8 @@ class Names:
             return SYNONYM
         if noun.endswith(f" {tag}"):
             return HEAD  # a "wooden chair" may be tagged chair
+        if noun.startswith(tag) or tag.startswith(noun):
+            return 0.0  # a tablecloth is no table, and a bedroom no bed: the last part of a compound says what it is
         cosine = self.cosine(noun, tag)
         return cosine if cosine >= COSINE else 0.0
 

@@ -8,11 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from placegraph.nodes.grounding.names import Names
+from placegraph.nodes.grounding.names import Fit, Names
 from placegraph.nodes.grounding.phrases import ORDINALS
 from placegraph.nodes.grounding.program import Program
 from placegraph.nodes.grounding.words import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph
+
+PLACE_LIKENESS = 0.7  # departs: the embeddings put bedroom and living room at 0.5, which are not the same place
 
 
 @dataclass
@@ -37,7 +39,8 @@ def narrow(graph: SceneGraph, program: Program, names: Names) -> Scope:
             scope.sure = False
             scope.notes.append(f"the map has no {program.floor}; looked on all {len(graph.layer('floor'))} floors")
     if program.room:
-        places = places_called(program.room, [node for node in scope.places if node.layer != "floor"], names)
+        fits = places_called(program.room, [node for node in scope.places if node.layer != "floor"], names)
+        places = [fit.node for fit in fits]
         if places:
             listed = ", ".join(f"{place.name} {place.id}" for place in places)
             scope.notes.append(f"looked {'outside' if program.outside else 'in'} {program.room}: {listed}")
@@ -58,11 +61,11 @@ def _keep_below(graph: SceneGraph, scope: Scope, tops: Sequence[Node], *, outsid
     scope.places = [node for node in scope.places if is_kept(node)]
 
 
-def places_called(name: str, places: Sequence[Node], names: Names) -> list[Node]:
+def places_called(name: str, places: Sequence[Node], names: Names) -> list[Fit]:
     """Rooms and locations with that name: where it is the strongest one, else where it is among the likely ones."""
-    fits = names.named(name, places)
-    strongest = [fit.node for fit in fits if fit.node.tags and fit.tag == fit.node.tags[0].name]
-    return strongest or [fit.node for fit in fits]
+    fits = [fit for fit in names.named(name, places) if names.likeness(name, fit.tag) >= PLACE_LIKENESS]
+    strongest = [fit for fit in fits if fit.node.tags and fit.tag == fit.node.tags[0].name]
+    return strongest or fits
 
 
 def floors_called(graph: SceneGraph, words: str) -> list[Node]:

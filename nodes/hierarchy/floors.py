@@ -1,9 +1,9 @@
 """Floors from the heights of horizontal layers and the camera's path.
 
 Source: paper, floor layer (height histogram, peaks, DBSCAN, the two strongest of each cluster, pairs).
-Departs: a layer weighs by the plan area it covers, so that walls and dense scans of one corner do not drown a floor; weak
-layers are kept, since h > .9 h_max loses floors of partial scans; of each pair the camera's path decides what is a floor
-(someone stood above it) and what a ceiling; there is always a floor where there are points. Levels less than
+Departs: a layer weighs by the plan area it covers, so that walls and dense scans of one corner do not drown a floor;
+weak layers are kept, since h > .9 h_max loses floors of partial scans; of each pair the camera's path decides what is
+a floor (someone stood above it) and what a ceiling; there is always a floor where there are points. Levels less than
 `storey_m` above a floor (steps, landings, split levels) belong to it.
 """
 

@@ -1,4 +1,4 @@
-"""Keep the ids of places across rebuilds by how much their footprints overlap; an id is never given to another place."""
+"""Keep the ids of places across rebuilds by the overlap of their footprints; an id is never given to another place."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RASTER_M = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """What identifies a place: its footprint (K, 2) m, world, and the group (say, a floor's id) that it cannot leave."""
+    """What identifies a place: its footprint (K, 2) m, world, and the group (a floor's id) that it cannot leave."""
 
     footprint: Points
     group: str = ""

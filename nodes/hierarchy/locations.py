@@ -1,9 +1,9 @@
 """Locations: groups of objects that stand close together in one room.
 
-Source: paper, location layer, by the recipe that made its training labels: DBSCAN on a height band, each object joins the
-cluster with most of its points, clusters with few objects go, project, outline, drop small and elongated polygons.
-Departs: no trained detector; DBSCAN runs on coarse cells of the objects' points, room by room; the outline is that of the
-closed bird's-eye mask, which like an alpha shape may be concave.
+Source: paper, location layer, by the recipe that made its training labels: DBSCAN on a height band, each object joins
+the cluster with most of its points, clusters with few objects go, project, outline, drop small and elongated polygons.
+Departs: no trained detector; DBSCAN runs on coarse cells of the objects' points, room by room; the outline is that of
+the closed bird's-eye mask, which like an alpha shape may be concave.
 """
 
 from __future__ import annotations
@@ -98,8 +98,7 @@ def _outline(objects: list[Points], config: LocationConfig) -> F64 | None:
     mask = np.zeros(grid.shape, np.uint8)
     mask[grid.cells(xy)] = 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel)
-    outline = grid.outline(mask.astype(bool))
+    outline = grid.outline(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel).astype(bool))
     area = cv2.contourArea(outline.astype(np.float32))
     length = cv2.arcLength(outline.astype(np.float32), True)
     if area < config.least_area_m2 or 4 * np.pi * area < config.compactness * length**2:

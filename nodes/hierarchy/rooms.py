@@ -125,11 +125,11 @@ def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid:
     seen = np.zeros(grid.shape, np.uint8)
     seen[grid.cells(free_points)] = 1
     side = max(1, int(np.ceil(free_cell_m / grid.cell_m))) | 1  # a free cell is wider than a pixel
-    seen = cv2.dilate(seen, np.ones((side, side), np.uint8))
-    seen[grid.cells(points)] = 1
+    wide = np.asarray(cv2.dilate(seen, np.ones((side, side), np.uint8)))
+    wide[grid.cells(points)] = 1
     reach = max(1, round(config.close_m / grid.cell_m))
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    padded = cv2.copyMakeBorder(seen, reach, reach, reach, reach, cv2.BORDER_CONSTANT, value=0)
+    padded = cv2.copyMakeBorder(wide, reach, reach, reach, reach, cv2.BORDER_CONSTANT, value=0)
     return cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[reach:-reach, reach:-reach].astype(bool)
 
 
@@ -188,7 +188,7 @@ def _grow(labels: I32, mask: Bool) -> None:
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     rest = mask & (labels == 0)
     while rest.any():
-        spread = cv2.dilate(labels.astype(np.float32), cross).astype(np.int32)
+        spread = cv2.dilate(labels.astype(np.float32), cross).astype(np.int32)  # dilation knows no int32
         reached = rest & (spread > 0)
         if not reached.any():
             return

@@ -263,6 +263,25 @@ def test_what_cannot_be_written_is_a_config_error(tmp_path: Path) -> None:
         RecordingWriter(None, "test", {})
 
 
+def test_a_full_disk_is_a_config_error_said_once(path: Path) -> None:
+    # A limit on the file's size stands for the disk; it is for ever, so another process takes it.
+    code = (
+        "import resource, signal, sys; from pathlib import Path; from placegraph.runtime import messages as m\n"
+        "from placegraph.runtime.errors import ConfigError\n"
+        "from placegraph.runtime.recording import RecordingWriter\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
+        "writer = RecordingWriter(Path(sys.argv[1]), 'full', {})\n"
+        "answer = m.Answer(frame_id=-1, stamp_ns=0, question_id='q', json='x' * 300_000)\n"
+        "try:\n"
+        "    for _ in range(100): writer.write(answer)\n"
+        "except ConfigError as error: print(error)\n"
+        "writer.close()"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
+    assert f"{path}: cannot write the recording any further (is the disk full?)" in done.stdout
+
+
 def test_reading_is_lazy(path: Path) -> None:
     found = read(record(path, [end(i) for i in range(10)]), [m.End])
     assert isinstance(found, Iterator)

@@ -20,8 +20,17 @@ def test_likeness(names, noun, tag, score):
     assert names.likeness(noun, tag) == score
 
 
-OTHER_KIND = [("mug", "rug"), ("glass", "window"), ("desk", "sofa"), ("bed", "nightstand"), ("floor", "carpet"),
-              ("chair", "armchair"), ("fridge", "shelf"), ("bin", "bicycle"), ("lamp", "chair"), ("piano", "table")]  # fmt: skip
+OTHER_KIND = [
+    ("mug", "rug"), ("glass", "window"), ("desk", "sofa"), ("bed", "nightstand"), ("floor", "carpet"),
+    ("chair", "armchair"), ("fridge", "shelf"), ("bin", "bicycle"), ("lamp", "chair"), ("piano", "table"),
+]  # fmt: skip
+SAME_KIND = [
+    ("fridge", "refrigerator"),
+    ("couch", "sofa"),
+    ("tv", "television"),
+    ("plant", "flower"),
+    ("lamp", "light"),
+]
 
 
 def test_the_cosine_threshold_parts_the_pairs(names):

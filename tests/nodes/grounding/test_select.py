@@ -18,8 +18,8 @@ def test_a_map_with_nothing_in_it(names, node_of):
 
 @pytest.mark.parametrize(
     ("words", "expected"),
-    [("upstairs", ["F1"]), ("downstairs", ["F0"]), ("first floor", ["F0"]), ("second floor", ["F1"]), ("top floor", ["F1"]),
-     ("ground floor", ["F0"]), ("floor 2", ["F1"]), ("third floor", []), ("floor 7", [])],
+    [("upstairs", ["F1"]), ("downstairs", ["F0"]), ("first floor", ["F0"]), ("second floor", ["F1"]),
+     ("top floor", ["F1"]),     ("ground floor", ["F0"]), ("floor 2", ["F1"]), ("third floor", []), ("floor 7", [])],
 )  # fmt: skip
 def test_floors(house, words, expected):
     assert ids(floors_called(house, words)) == expected
@@ -31,7 +31,8 @@ def test_rooms_locations_and_outside(names, house):
 
     assert found(room="bedroom") == ["O15", "O16", "O17", "O18", "O19", "O20"]
     assert found(room="dining area") == ["O0", "O1", "O2", "O3", "O4", "O5", "O6"]
-    assert found(room="bedroom", floor="first floor") == found(floor="first floor")
+    assert found(room="bedroom", floor="second floor") == found(floor="second floor")
+    assert found(room="bathroom") == found()
     assert "O15" not in found(room="bedroom", outside=True)
     assert found(room="lounge") == found(room="living room")
 
