@@ -48,7 +48,7 @@ class RecordingWriter:
     """Writes messages into one Rerun stream: a file, a viewer's server on this machine, or both.
 
     `path` None writes no file; `viewer_port` 0 opens no socket, else a viewer may connect on 127.0.0.1. `properties`
-    are readable with `properties`. `blueprint` is how the viewer opens.
+    say what the run was; the function of that name reads them back. `blueprint` is how the viewer opens.
     Raises ConfigError when the file cannot be written or the port is taken.
     """
 

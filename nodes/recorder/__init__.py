@@ -48,6 +48,7 @@ class Recorder(Node):
 
     config_type: ClassVar[type[NodeConfig]] = RecorderConfig
     takes = RECORDED
+    optional = (m.Frame, *RECORDED)  # whatever the other nodes of a dataflow give
 
     def __init__(self, config: RecorderConfig, context: Context) -> None:
         super().__init__(config, context)

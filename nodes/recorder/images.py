@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import rerun as rr
 
 from placegraph.nodes.recorder.picture import Picture, color_of, markdown
 from placegraph.runtime import messages as m
-from placegraph.runtime.geometry import quaternion_xyzw
 
 JPEG_QUALITY = 80  # for the eye: 45 kB at 640x480, the exact image lies in /messages
 IMAGE = "world/camera/image"
@@ -30,13 +30,8 @@ def draw_keyframe(picture: Picture, keyframe: m.Keyframe, pngs: dict[str, bytes]
 
 def draw_camera_pose(picture: Picture, world_from_camera: m.F64) -> None:
     """Put the camera, and so its image and frustum, at a (4, 4) pose."""
-    picture.log(
-        "world/camera",
-        rr.Transform3D(
-            translation=world_from_camera[:3, 3],
-            quaternion=rr.Quaternion(xyzw=quaternion_xyzw(world_from_camera[:3, :3])),
-        ),
-    )
+    transform = rr.Transform3D(translation=world_from_camera[:3, 3], mat3x3=world_from_camera[:3, :3])
+    picture.log("world/camera", transform)
 
 
 def _draw_camera(picture: Picture, image: m.Frame | m.Keyframe, depth_png: bytes) -> None:
@@ -51,7 +46,9 @@ def _draw_camera(picture: Picture, image: m.Frame | m.Keyframe, depth_png: bytes
     )
     picture.image_size = (height, width)
     picture.log(IMAGE, pinhole)
-    picture.log(f"{IMAGE}/color", rr.Image(image.color).compress(jpeg_quality=JPEG_QUALITY))
+    bgr = cv2.cvtColor(image.color, cv2.COLOR_RGB2BGR)
+    jpeg = bytes(cv2.imencode(".jpg", bgr, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))[1].data)
+    picture.log(f"{IMAGE}/color", rr.EncodedImage(contents=jpeg, media_type="image/jpeg"))
     depth = rr.EncodedDepthImage(
         depth_png, media_type="image/png", meter=1.0 / image.depth_unit_m, colormap="turbo", depth_range=[0.0, 6.0]
     )

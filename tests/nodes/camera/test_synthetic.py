@@ -172,3 +172,10 @@ def test_no_two_objects_share_space():
         for other, second in things[i + 1 :]:
             overlap = np.minimum(box[1], second[1]) - np.maximum(box[0], second[0])
             assert (overlap <= 1e-9).any(), (name, other)
+
+
+def test_no_object_stands_in_a_wall_or_radiator():
+    walls = np.array([span for _, span in scene.STRUCTURE]).reshape(-1, 2, 3)
+    for name, box in truth():
+        overlap = np.minimum(box[1], walls[:, 1]) - np.maximum(box[0], walls[:, 0])
+        assert (overlap <= 1e-9).any(axis=1).all(), name

@@ -1,0 +1,39 @@
+# make demo: set everything up and map the drawn flat.  make test: set everything up and run the tests.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+OUT ?= out/demo
+
+# No wheel of llama-cpp-python is on PyPI: it compiles once (7 minutes on two cores), after that pip's cache has it.
+# Native code would crash on CPUs that advertise AMX where the kernel forbids it.
+export CMAKE_ARGS ?= -DGGML_NATIVE=OFF -DLLAVA_BUILD=OFF
+PIP_INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt
+
+.PHONY: demo test check clean
+
+demo: $(VENV)/.installed
+	rm -rf $(OUT)
+	$(BIN)/placegraph run configs/demo.toml --out $(OUT) --endpoint tcp/127.0.0.1:7461
+	@for question in "which chair is closest to the sofa" "the cup on the table" "the lamp in the corner" \
+	    "what is the largest table" "find the piano"; do \
+	    echo; echo "? $$question"; $(BIN)/placegraph ask $(OUT) "$$question" || [ $$? -eq 3 ] || exit 1; \
+	done
+	@echo; echo "look at it:  $(BIN)/placegraph view $(OUT)"
+
+test: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -q
+
+check: $(VENV)/.installed-dev
+	PYTHON=$(BIN)/python tools/check.sh
+
+$(VENV)/.installed: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(PIP_INSTALL) --editable .
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	$(PIP_INSTALL) --editable '.[dev]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) build out
