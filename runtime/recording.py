@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 import socket
+import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -36,9 +37,9 @@ PROPERTIES = "placegraph"
 FLUSH_S = 1.0
 CHUNK_BYTES = 1 << 20
 FLUSH_BYTES = 2 << 20
-# Measured on ten 640x480 7-Scenes pairs, one thread: colour 15 ms and 369 kB (default strategy: 17 ms and 417 kB; LZ4:
-# 1.3 ms and 772 kB), depth 6.4 ms and 96 kB (LZ4: 0.8 ms and 167 kB). Keyframes come once or twice a second on a disk
-# that is small, so size wins; RLE is both faster and smaller than zlib's search on camera noise.
+FLUSH_TIMEOUT_S = 5.0  # without one a flush was seen to wait for ever when the disk filled up during it
+# Ten 640x480 7-Scenes pairs, one thread: colour 15 ms, 369 kB (default strategy 17 ms, 417 kB; LZ4 1.3 ms, 772 kB),
+# depth 6.4 ms, 96 kB (LZ4 0.8 ms, 167 kB). Keyframes are few and disks small, so size wins.
 PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
 
 M = TypeVar("M", bound=Message)
@@ -47,9 +48,8 @@ M = TypeVar("M", bound=Message)
 class RecordingWriter:
     """Writes messages into one Rerun stream: a file, a viewer's server on this machine, or both.
 
-    `path` None writes no file; `viewer_port` 0 opens no socket, else a viewer may connect on 127.0.0.1. `properties`
-    say what the run was; the function of that name reads them back. `blueprint` is how the viewer opens.
-    Raises ConfigError when the file cannot be written or the port is taken.
+    `path` None: no file; `viewer_port` 0: no socket, else a viewer may connect on 127.0.0.1. `properties` say what
+    the run was. `blueprint` is how the viewer opens. Raises ConfigError when file or port cannot be had.
     """
 
     def __init__(
@@ -124,16 +124,20 @@ class RecordingWriter:
         return pngs
 
     def close(self) -> None:
-        """Write what is pending, the footer, and let go of file and port; raises ConfigError if that fails."""
+        """Write what is pending and the footer, let go of file and port; raises ConfigError unless `write` did."""
         try:
-            if not self._failed:  # once is enough
+            if not self._failed:
                 self._flush()
         finally:
-            self.stream.disconnect()
+            if self._failed:
+                rr.unregister_shutdown()  # Rerun may wait for ever for a dead writer: the process shall not
+                threading.Thread(target=self.stream.disconnect, daemon=True).start()
+            else:
+                self.stream.disconnect()
 
     def _flush(self) -> None:
         try:
-            self.stream.flush()
+            self.stream.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
             self._failed = True
             where = self._path or "the viewer's server"
@@ -153,11 +157,10 @@ def images_of(message: Message) -> dict[str, bytes]:
 
 
 def read(path: Path, kinds: Sequence[type[Message]]) -> Iterator[Message]:
-    """The recorded messages of some kinds in the order they were written, decoded one by one.
+    """The recorded messages of some kinds in the order they were written, decoded one by one; arrays are read-only.
 
-    Memory holds one chunk (about 1 MB) for each kind, however long the recording. Arrays are read-only.
-    Raises SourceError when there is no such file, SchemaError when it is damaged, is no recording of placegraph, or
-    was written by another version; the last two also while iterating.
+    Memory holds one chunk (about 1 MB) for each kind, however long the recording. Raises SourceError without such a
+    file, SchemaError (also while iterating) when it is damaged, foreign, or written by another version.
     """
     reader = _open(path)
     rows = [_rows(path, reader, kind) for kind in sorted(set(kinds), key=lambda kind: kind.__name__)]
@@ -170,8 +173,7 @@ def kinds_in(path: Path) -> dict[str, int]:
     for chunk in _chunks(path, _open(path).stream().filter(content=f"{MESSAGES}/**", has_timeline=SEQUENCE)):
         name = chunk.entity_path.rpartition("/")[2]
         counts[name] = counts.get(name, 0) + chunk.num_rows
-    known = {kind.__name__ for kind in all_kinds()}
-    unknown = sorted(set(counts) - known)
+    unknown = sorted(set(counts) - {kind.__name__ for kind in all_kinds()})
     if unknown:
         raise SchemaError(f"{path}: holds the kind {unknown[0]}, which this version of placegraph does not know")
     return dict(sorted(counts.items()))
@@ -190,8 +192,7 @@ def properties(path: Path) -> dict[str, str]:
 
 def _require_writable(path: Path) -> None:
     try:
-        with path.open("wb"):
-            pass
+        path.write_bytes(b"")
     except OSError as error:
         raise ConfigError(f"cannot write the recording {path}: {error.strerror}") from None
 
@@ -212,8 +213,8 @@ def _is_image(spec: ArraySpec) -> bool:
 def _to_png(image: NDArray[Any], where: str) -> bytes:
     if image.size == 0:
         raise SchemaError(f"{where}: an empty image cannot be recorded, its shape is {image.shape}")
-    ordered = cv2.cvtColor(image, cv2.COLOR_RGB2BGR) if image.ndim == 3 else image
-    return bytes(cv2.imencode(".png", ordered, PNG)[1].data)
+    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR) if image.ndim == 3 else image
+    return bytes(cv2.imencode(".png", bgr, PNG)[1].data)
 
 
 def _from_png(data: NDArray[np.uint8], where: str) -> NDArray[Any]:
@@ -230,8 +231,7 @@ def _open(path: Path) -> RrdReader:
         raise SourceError(f"{path}: no such recording")
     try:
         with warnings.catch_warnings():
-            # A writer that was killed leaves no footer; all chunks but the last are there.
-            warnings.simplefilter("ignore", RerunWarning)
+            warnings.simplefilter("ignore", RerunWarning)  # a killed writer left no footer; its chunks are there
             reader = RrdReader(str(path))
             stores = reader.recordings()
     except (RuntimeError, ValueError) as error:

@@ -84,7 +84,7 @@ class Progress:
             table.add_row(name, *(str(n[key]) for key in ("steps", "p50_ms", "p95_ms", "drops", "memory_mb")))
         console.print(table)
         console.print(
-            f"{summary['frames']} frames ({summary['keyframes']} keyframes, {summary['untrusted_poses']} poses untrusted)"
+            f"{summary['frames']} frames ({summary['keyframes']} keyframes, {summary['untrusted_poses']} untrusted)"
             f" in {summary['seconds']} s: {summary['frames_per_s']} frames per second, start and stop included"
         )
         if summary["trajectory"]:

@@ -19,7 +19,7 @@ from placegraph.runtime.inline import Inline
 from placegraph.runtime.launch import Launcher
 from placegraph.runtime.messages import End, Frame, Graph, Health, Keyframe, Map, Message, Pose
 from placegraph.tools.evaluate import against_given
-from placegraph.tools.map_folder import Collector, next_folder, prepare, write_run
+from placegraph.tools.map_folder import GRAPH, Collector, next_folder, prepare, write_run
 from placegraph.tools.progress import Progress
 
 POLL_S = 0.1
@@ -34,6 +34,7 @@ def run(
     inline: Annotated[
         bool, typer.Option(help="One thread in this process instead of a process for each node.")
     ] = False,
+    stay: Annotated[bool, typer.Option(help="After the source's end keep answering questions until Ctrl-C.")] = False,
     endpoint: Annotated[str, typer.Option(help="Where the Zenoh hub listens, e.g. tcp/127.0.0.1:7447.")] = "",
     quiet: Annotated[bool, typer.Option(help="No progress table.")] = False,
 ) -> None:
@@ -47,7 +48,7 @@ def run(
         overrides["camera"]["path"] = str(source)
     if limit:
         overrides["camera"]["limit"] = limit
-    folder = run_dataflow(with_settings(read(config), overrides, endpoint), config.stem, out, inline, quiet)
+    folder = run_dataflow(with_settings(read(config), overrides, endpoint), config.stem, out, inline, quiet, stay)
     print(f'\nmap        {folder}\nask        placegraph ask {folder} "which chair is closest to the table"')
     print(f"look       placegraph view {folder}")
 
@@ -65,8 +66,10 @@ def with_settings(config: RunConfig, overrides: dict[str, dict[str, Any]], endpo
     return config.model_copy(update={"nodes": nodes, "bus": bus})
 
 
-def run_dataflow(config: RunConfig, name: str, out: Path | None, inline: bool, quiet: bool) -> Path:
+def run_dataflow(config: RunConfig, name: str, out: Path | None, inline: bool, quiet: bool, stay: bool = False) -> Path:
     """Run to the end and write the map folder; returns it."""
+    if inline and stay:
+        raise ConfigError("--stay needs processes: an inline run has no bus to answer on")
     folder = (out or next_folder(Path(config.run.out_dir), name)).resolve()
     dataflow = build(config, folder)
     prepare(folder)
@@ -77,7 +80,7 @@ def run_dataflow(config: RunConfig, name: str, out: Path | None, inline: bool, q
         if inline:
             nodes = _run_inline(dataflow, collector, progress)
         else:
-            nodes = _run_processes(dataflow, folder, collector, progress)
+            nodes = _run_processes(dataflow, folder, collector, progress, stay)
     elapsed_s = time.monotonic() - began
     collector.write(folder)
     summary = _summary(dataflow, collector, nodes, elapsed_s)
@@ -121,7 +124,9 @@ def _interrupts() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _run_processes(dataflow: Dataflow, folder: Path, collector: Collector, progress: Progress) -> list[Health]:
+def _run_processes(
+    dataflow: Dataflow, folder: Path, collector: Collector, progress: Progress, stay: bool
+) -> list[Health]:
     messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
     health: dict[str, Health] = {}
 
@@ -138,11 +143,14 @@ def _run_processes(dataflow: Dataflow, folder: Path, collector: Collector, progr
             launcher.observe(kind, messages.put)
         launcher.start()
         give_up_at = float("inf")
-        while not collector.complete:
+        while not collector.complete or (stay and not interrupts):
             time.sleep(POLL_S)
             launcher.poll()
             drain()
             progress.refresh()
+            if stay and collector.complete and not (folder / GRAPH).exists():
+                collector.write(folder)
+                progress.say(f"mapped; answering questions at {dataflow.config.bus.endpoint} until Ctrl-C")
             if interrupts and give_up_at == float("inf"):
                 progress.say(
                     "ending the source; what is in flight still goes into the map (Ctrl-C again: stop at once)"

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
 from placegraph.models_onnx.text import TextEncoder
 from placegraph.nodes.grounding.answer import Reasoner, error_answer, to_json
@@ -30,8 +31,8 @@ class GroundingConfig(NodeConfig):
     seed: int = 0
     name_places: bool = True  # False: rooms and locations stay without names
     use_model: bool = True  # False: no question is put to the language model; what it would decide stays open
-    room_types: tuple[str, ...] = ROOM_TYPES
-    location_types: tuple[str, ...] = LOCATION_TYPES
+    room_types: list[str] = Field(list(ROOM_TYPES))  # lists: what an array in TOML is
+    location_types: list[str] = Field(list(LOCATION_TYPES))
 
 
 class Grounding(Node):
@@ -51,9 +52,9 @@ class Grounding(Node):
         path = Path(config.model_path) if config.model_path else None
         self._model = LanguageModel(path, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed)
         self._namer = Namer(self._model, config.room_types, config.location_types)
-        types = (*config.room_types, *config.location_types)
+        place_types = (*config.room_types, *config.location_types)
         names = Names(TextEncoder().encode)
-        self._reasoner = Reasoner(names, self._model, types, use_model=config.use_model)
+        self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model)
         self._graph: SceneGraph | None = None
         self._revision = -1
 

@@ -1,9 +1,10 @@
 """Names of rooms and locations from what they contain: a pure function of the tags, by the language model.
 
 Source: paper, "Room Layer" and "Location Layer". Departs: each thing alone is asked for its place among a fixed list of
-types, by log-probability minus the type's mean over common things, and the things of a place are added up: on 25 lists
-of room contents the packaged model is right 22 times so and 18 times when asked for the whole list at once (asked
-freely, hardly ever). Each tag is asked once for good, and a place keeps a distribution instead of one name.
+types, by log-probability minus the type's mean over common things, and the things of a place are added up, each by
+how much it tells. Measured on lists written by hand: 28 of 31 rooms and 13 of 16 locations right (23 of the 25 rooms
+tried first); asked for the whole list at once 18 of those 25 and 9 of 16. Each tag is asked once for good, and a
+place keeps a distribution, not one name.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ REFERENCE = (
     "box", "washing machine", "coat", "door", "plate", "chair", "lamp", "window",
 )  # fmt: skip
 KEPT = 3
+LEAST_SPREAD = 0.1  # nats; a single type, or types that all things fit alike, must not divide by nothing
 
 Evidence = tuple[tuple[str, int], ...]  # sorted (tag, count)
 
@@ -75,14 +77,15 @@ class Namer:
 
     def _ask(self, layer: str, evidence: Evidence) -> tuple[tuple[str, float], ...]:
         types = self._types[layer]
-        prior = np.mean([self._thing(layer, thing) for thing in REFERENCE], axis=0)
-        # how many there are of a thing says little (22 of 25 rooms right without counts, 20 with)
-        total = np.sum([self._thing(layer, tag) - prior for tag, _ in evidence], axis=0)
-        scores = total / np.sqrt(len(evidence))  # the things of one room are no independent witnesses
+        common = np.array([self._thing(layer, thing) for thing in REFERENCE])
+        spread = np.maximum(common.std(axis=0), LEAST_SPREAD)
+        # how many there are of a thing says little: a room with six chairs is no more a dining room than one with four
+        fits = np.array([(self._thing(layer, tag) - common.mean(axis=0)) / spread for tag, _ in evidence])
+        weights = np.array([_tells(fit) for fit in fits])
+        scores = weights @ fits / np.sqrt(np.maximum((weights**2).sum(), 1e-12))
         order = np.argsort(-scores, kind="stable")[:KEPT]
-        weights = np.exp(scores[order] - scores[order[0]])
-        weights /= weights.sum()
-        return tuple((types[i], float(weight)) for i, weight in zip(order, weights, strict=True))
+        shares = _softmax(scores[order])
+        return tuple((types[i], float(share)) for i, share in zip(order, shares, strict=True))
 
     def _thing(self, layer: str, tag: str) -> NDArray[np.float64]:
         """Log-probability of each type of place for one thing, (N,), asked once a tag."""
@@ -92,6 +95,17 @@ class Namer:
             options = [f" {name}" for name in self._types[layer]]
             self._things[key] = self._model.log_probabilities(opening, rest, options)
         return self._things[key]
+
+
+def _softmax(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    powers = np.exp(values - values.max())
+    return np.asarray(powers / powers.sum())
+
+
+def _tells(fit: NDArray[np.float64]) -> float:
+    """How much a thing says of its place, in nats: a bed says much, a window nothing. 0 when all types fit alike."""
+    share = _softmax(fit)
+    return float((share * np.log(share * len(share) + 1e-12)).sum())
 
 
 def evidence_of(graph: SceneGraph, place: Node) -> Evidence:

@@ -51,6 +51,7 @@ TURNED = (
     (re.compile(OWNS + r"(?:next to|near|beside|by) it\b", re.IGNORECASE), r"near \1"),
     (re.compile(OWNS + r"(?:above|over) it\b", re.IGNORECASE), r"below \1"),
     (re.compile(OWNS + r"(?:under|below|underneath) it\b", re.IGNORECASE), r"above \1"),
+    (re.compile(r"\bwithout (.{1,60}?)(?: on it| on top)?(?=[,.?!]|$)", re.IGNORECASE), r"not under \1"),
     (re.compile(OWNS + r"(?:in|inside) it\b", re.IGNORECASE), r"around \1"),
 )
 

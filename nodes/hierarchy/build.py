@@ -13,6 +13,7 @@ from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floor
 from placegraph.nodes.hierarchy.identity import Identities, Place, span_footprint
 from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
 from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, find_rooms
+from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.geometry import bounding_box, convex_footprint
 from placegraph.runtime.messages import Map
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
@@ -46,7 +47,11 @@ class GraphBuilder:
         self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
 
     def build(self, world: Map) -> SceneGraph:
-        """The graph of a Map; rooms and locations are without names. Deterministic in the sequence of maps."""
+        """The graph of a Map; rooms and locations are without names. Deterministic in the sequence of maps.
+
+        Raises SchemaError for points that are not finite and objects without points.
+        """
+        _check(world)
         objects = np.split(world.object_points_world, world.object_point_offsets[1:-1]) if len(world.object_ids) else []
         spans = find_floors(world.points_world, world.camera_positions_world, self._config.floors)
         if not spans and objects:  # objects without a cloud: the floor is what they stand on
@@ -85,6 +90,16 @@ class GraphBuilder:
             box = bounding_box(world.object_boxes_world[mine].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
         return nodes + [_object(i, parent[i], objects[i], world) for i in members]
+
+
+def _check(world: Map) -> None:
+    for name in ("points_world", "free_points_world", "camera_positions_world", "object_points_world"):
+        bad = np.flatnonzero(~np.isfinite(getattr(world, name)).all(axis=1))
+        if len(bad):
+            raise SchemaError(f"Map {world.revision}: {name}[{bad[0]}] is not finite")
+    empty = np.flatnonzero(np.diff(world.object_point_offsets) <= 0)
+    if len(empty):
+        raise SchemaError(f"Map {world.revision}: object {world.object_ids[empty[0]]} has no points")
 
 
 def _in_zone(xyz: Points, span: FloorSpan) -> Points:

@@ -34,6 +34,8 @@ class FloorConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     camera_min_m: float = 0.15  # a robot's sensor, or a person's hand, above its floor
     camera_max_m: float = 2.2
     below_share: float = 0.1  # of the seen plan area; more than this well below a layer says that it is no floor
+    upper_share: float = 0.25  # of a slab's stronger layer, for its upper one to be a floor and not beds on that floor
+    stood_share: float = 0.1  # of the path above the floors below, for a layer to carry it
     camera_share: float = 0.05  # of the path must be too high for the floors below before another is looked for
 
 
@@ -130,8 +132,9 @@ def _floor_above(slabs: list[list[_Layer]], least: float, standing: F64, config:
     for slab in slabs:
         pair = sorted(sorted(slab, key=lambda layer: -layer.area)[:2], key=lambda layer: -layer.height)
         for layer in pair:
-            comparable = layer.area >= 0.5 * max(other.area for other in pair)
-            if layer.height >= least and comparable and _below(layer, standing, config) >= 0.1 * len(standing):
+            comparable = layer.area >= config.upper_share * max(other.area for other in pair)
+            stood_on = _below(layer, standing, config) >= config.stood_share * len(standing)
+            if layer.height >= least and comparable and stood_on:
                 return layer.height
     return None
 

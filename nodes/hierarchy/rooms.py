@@ -62,7 +62,9 @@ class Grid:
         # a border and doubled pixels: contours run through pixel centres and would lose half a cell on each side
         big = cv2.resize(np.pad(mask.view(np.uint8), 1), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
         contours, _ = cv2.findContours(big, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        contour = cv2.approxPolyDP(max(contours, key=cv2.contourArea), 1.0, True)
+        contour = max(contours, key=cv2.contourArea)
+        simple = cv2.approxPolyDP(contour, 1.0, True)
+        contour = simple if len(simple) >= 3 else contour  # a few cells would collapse to a line
         return np.asarray((contour.reshape(-1, 2) + 0.5) / 2 - 1, float) * self.cell_m + self.origin
 
 

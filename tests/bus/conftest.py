@@ -14,8 +14,9 @@ def bus_config() -> BusConfig:
 
 @pytest.fixture(autouse=True)
 def no_process_is_left() -> Iterator[None]:
+    before = set(psutil.Process().children(recursive=True))
     yield
-    left = psutil.Process().children(recursive=True)
+    left = [process for process in psutil.Process().children(recursive=True) if process not in before]
     for process in left:
         process.kill()
     psutil.wait_procs(left, timeout=5)

@@ -107,7 +107,7 @@ def test_a_process_that_cannot_start_is_named_with_its_log(bus_config, tmp_path)
     dataflow.config.nodes["instances"]["model"] = "no_such_model"
     with (
         Launcher(dataflow, tmp_path) as launcher,
-        pytest.raises(PlacegraphError, match="(?s)instances ended.*no_such_model"),
+        pytest.raises(PlacegraphError, match=r"(?s)instances ended.*no_such_model"),
     ):
         launcher.start()
 

@@ -48,13 +48,13 @@ def test_before_any_graph(ask):
 
 
 def test_a_found_object(node, ask):
-    answer = ask(node, "which chair is closest to the fridge?", k=2, question_id="a")
+    answer = ask(node, "which vase is closest to the bed?", k=2, question_id="a")
     assert set(answer) == KEYS
-    assert (answer["status"], answer["object_id"], answer["sure"], answer["llm_calls"]) == ("found", "O3", True, 0)
-    assert [step["id"] for step in answer["path"]] == ["B0", "F0", "R0", "L0", "O3"]
+    assert (answer["status"], answer["object_id"], answer["sure"], answer["llm_calls"]) == ("found", "O19", True, 0)
+    assert [step["id"] for step in answer["path"]] == ["B0", "F1", "R2", "O19"]
     assert [len(answer["candidates"]), answer["question_id"], answer["revision"]] == [2, "a", 3]
-    assert answer["box"] == [[0.775, 1.775, 0.0], [1.225, 2.225, 0.9]]
-    assert answer["evidence"][-1] == "chair O3 is 1.09 m from fridge O7, closest first, number 1 of 4"
+    assert answer["box"] == [[3.5, 0.5, 3.1], [3.7, 0.7, 3.5]]
+    assert answer["evidence"][-1] == "vase O19 is 1.48 m from bed O15, closest first, number 1 of 3"
     assert answer["viewpoint"]["source"] == "room centre"
 
 

@@ -14,6 +14,7 @@ def test_the_longest_phrase_wins():
 
 def test_turned():
     assert turned("the shelf that has the vase on it") == "the shelf under the vase"
+    assert turned("the nightstand without the lamp?") == "the nightstand not under the lamp?"
     assert turned("the cup on the shelf") == "the cup on the shelf"
 
 
