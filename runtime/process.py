@@ -23,21 +23,20 @@ import psutil
 from pydantic import BaseModel, ConfigDict
 
 from placegraph.runtime import log, messages
-from placegraph.runtime.bus import Bus, BusConfig, Request
+from placegraph.runtime.bus import Bus, BusConfig
 from placegraph.runtime.codec import decode, encode
-from placegraph.runtime.errors import PlacegraphError, QueryError
+from placegraph.runtime.desk import Desk
+from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.flow import Inbox, Parcel, Window
 from placegraph.runtime.health import StepStats
-from placegraph.runtime.messages import Health, Message
+from placegraph.runtime.messages import Answer, Health, Message, Question
 from placegraph.runtime.node import Context, Node, Source, build_node
-from placegraph.runtime.question import error_reply, parse_request
 from placegraph.runtime.topics import TOPICS
 
 logger = logging.getLogger(__name__)
 
 POLL_S = 0.2
 KEPT_FOR_CRASH = 4  # messages written to the crash file: the failing one and what led to it
-MAX_WAITING_QUESTIONS = 16
 
 
 class ProcessSpec(BaseModel):
@@ -68,10 +67,8 @@ class Process:
         self._puts: dict[type[Message], Any] = {}
         self._sequences: dict[type[Message], int] = {}
         self._expected: dict[type[Message], int] = {}
-        self._requests: dict[str, Request] = {}
+        self._desk = Desk(self._forward, spec.question_timeout_s)
         self._recent: deque[Parcel] = deque(maxlen=KEPT_FOR_CRASH)
-        self._asked = 0
-        self._lock = threading.Lock()
 
     # --- wiring
 
@@ -91,7 +88,7 @@ class Process:
         bus.watch_alive(self._on_alive)
         for kind in self.node.takes:
             if serves and kind is serves[0]:
-                bus.serve(self._on_request, "ask")
+                bus.serve(self._desk.take, "ask")
             else:
                 bus.subscribe(self._subscriber(kind), "topic", TOPICS[kind].key)
         bus.declare_alive(self.spec.node)
@@ -115,35 +112,8 @@ class Process:
         for window in self.windows.values():
             window.set_present(name, present)
 
-    def _on_request(self, request: Request) -> None:
-        """Turn a query into a Question in the inbox; a timer answers for a node that is too slow."""
-        with self._lock:
-            self._asked += 1
-            question_id = f"Q{self._asked}"
-            busy = len(self._requests) >= MAX_WAITING_QUESTIONS
-            if not busy:
-                self._requests[question_id] = request
-        if busy:
-            request.reply(error_reply("", f"busy: {MAX_WAITING_QUESTIONS} questions are waiting"))
-            return
-        try:
-            question = parse_request(request.payload, question_id)
-        except QueryError as error:
-            self._answer(question_id, error_reply("", str(error)))
-            return
-        # the shell's own id keeps two askers apart who chose the same one
-        self.inbox.put(Parcel(type(question), 0, msgpack.packb([question_id, encode(question)])))
-        limit = self.spec.question_timeout_s
-        reason = f"no answer within {limit:g} s"
-        timer = threading.Timer(limit, lambda: self._answer(question_id, error_reply("", reason)))
-        timer.daemon = True
-        timer.start()
-
-    def _answer(self, shell_id: str, payload: bytes) -> None:
-        with self._lock:
-            request = self._requests.pop(shell_id, None)
-        if request is not None:
-            request.reply(payload)
+    def _forward(self, number: int, question: Question) -> None:
+        self.inbox.put(Parcel(Question, number, encode(question)))
 
     def stop(self) -> None:
         """Finish what has arrived, then end; a source ends as if there were no more to give."""
@@ -179,28 +149,24 @@ class Process:
 
     def _take(self, parcel: Parcel) -> None:
         self._recent.append(parcel)
-        payload, shell_id = parcel.payload, ""
-        if self.node.serves and parcel.kind is self.node.serves[0]:
-            shell_id, payload = msgpack.unpackb(payload)
-        else:
+        asked = self.node.serves is not None and parcel.kind is self.node.serves[0]
+        if not asked:
             self._check_order(parcel)
-        message = decode(parcel.kind, payload)
-        if shell_id:
+        message = decode(parcel.kind, parcel.payload)
+        if asked:
             self._publish(message)
         began = time.monotonic()
         try:
             given = self.node.step(message)
         except Exception:
             self._write_crash(traceback.format_exc())
-            if shell_id:
-                self._answer(shell_id, error_reply("", f"the {self.spec.node} node failed; see its log"))
             raise
         self.stats.add_step(time.monotonic() - began)
         for out in given:
             self._publish(out)
-            if shell_id and self.node.serves and isinstance(out, self.node.serves[1]):
-                self._answer(shell_id, out.json.encode())  # type: ignore[attr-defined]
-        if parcel.sequence and parcel.kind not in self.node.feedback:
+            if asked and isinstance(out, Answer):
+                self._desk.answer(parcel.sequence, out.json.encode())
+        if not asked and parcel.kind not in self.node.feedback:
             self._receipt(msgpack.packb([parcel.kind.__name__, parcel.sequence]), b"")
 
     def _check_order(self, parcel: Parcel) -> None:
@@ -251,7 +217,8 @@ class Process:
         self._publish_health(time.monotonic() - last, memory.memory_info().rss / 1e6)
 
     def end(self) -> None:
-        """Let `report_health` give its last report and return."""
+        """Let `report_health` give its last report and return, and let nobody wait for an answer."""
+        self._desk.close(f"the {self.spec.node} node ended")
         self._ended.set()
 
     def _publish_health(self, elapsed_s: float, memory_mb: float) -> None:

@@ -90,7 +90,11 @@ def _language_model() -> Finding:
 def _camera() -> Finding:
     if importlib.util.find_spec("depthai") is None:
         return Finding("camera", "note", "no depthai: pip install 'placegraph[oak]' for a live OAK-D")
-    import depthai
+    from placegraph.nodes.camera.oak import find_device
+    from placegraph.runtime.errors import SourceError
 
-    devices = depthai.Device.getAllAvailableDevices()
-    return Finding("camera", "ok" if devices else "note", f"{len(devices)} OAK devices found")
+    try:
+        device = find_device("")
+    except SourceError as error:
+        return Finding("camera", "note", str(error))
+    return Finding("camera", "ok", f"an OAK camera: {device.deviceId}")

@@ -31,7 +31,7 @@ def test_bad_files_name_the_key(tmp_path: Path, text: str, problem: str) -> None
 
 
 def test_absent_file_lists_those_that_come_with_placegraph(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="no such dataflow file; with placegraph come: .*replay.toml"):
+    with pytest.raises(ConfigError, match=r"no such dataflow file; with placegraph come: .*replay\.toml"):
         read(tmp_path / "nothing.toml")
     assert read(Path("configs/replay.toml")).nodes.keys() >= {"camera", "fusion"}
     assert read(Path("replay.toml")).nodes == read(Path("configs/replay.toml")).nodes

@@ -36,7 +36,7 @@ def trace(boxes, pose):
 
 @pytest.fixture
 def view() -> Callable[..., tuple[Keyframe, Segments]]:
-    """view(frame_id, {label: (name, low, high)}, eye, target): a keyframe of boxes, and true masks of the named ones."""
+    """view(frame_id, {label: (name, low, high)}, eye, target): a keyframe of boxes, true masks of the named ones."""
 
     def make(frame_id, scene, eye, target, swallow=None):
         boxes = [(np.asarray(low, float), np.asarray(high, float)) for _, low, high in scene.values()]

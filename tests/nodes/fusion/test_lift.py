@@ -37,7 +37,7 @@ def test_what_is_too_far_gives_nothing(view):
 def test_a_box_outside_the_image_is_refused(view):
     keyframe, segments = view(4, {"table": TABLE}, (0, -1.5, 1.5), (0, 0, 0.7))
     moved = dataclasses.replace(segments, boxes_px=segments.boxes_px + np.int32(100))
-    with pytest.raises(SchemaError, match="frame 4: box .* outside 160x120"):
+    with pytest.raises(SchemaError, match=r"frame 4: box .* outside 160x120"):
         lifted(keyframe, moved)
 
 

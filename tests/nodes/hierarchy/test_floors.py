@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -43,7 +45,7 @@ def test_storeys_of_a_house(house_points, walk, storeys):
     found = floors(house_points(storeys), walk(storeys))
     assert [round(f.low, 1) for f in found] == [0.0, 3.0, 6.0][:storeys]
     assert [round(f.high, 1) for f in found] == [2.6, 5.6, 8.6][:storeys]
-    for below, above in zip(found[:-1], found[1:], strict=True):
+    for below, above in itertools.pairwise(found):
         assert below.zone_high == above.zone_low
 
 

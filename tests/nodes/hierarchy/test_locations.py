@@ -51,7 +51,7 @@ def test_an_object_joins_the_cluster_with_most_of_its_points():
 def test_small_and_elongated_areas_go():
     assert find(block(0, 0, 0.1), block(0.2, 0, 0.1)) == []
     row = [block(0.3 * i, 0, 0.2) for i in range(12)]
-    assert len(find(*row, compactness=0.1)) == 1
+    assert len(find(*row, compactness=0.05)) == 1
     assert find(*row) == []
 
 

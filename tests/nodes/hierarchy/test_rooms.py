@@ -53,7 +53,7 @@ def test_two_rooms_with_a_door(house_points):
 def test_what_was_not_seen_is_not_a_room(house_points):
     half = house_points(1)
     half = half[half[:, 0] < 4.02]
-    grid, rooms = rooms_of(half)
+    _, rooms = rooms_of(half)
     assert len(rooms) == 1 and rooms[0].outline.max(axis=0)[0] < 4.2
 
 

@@ -1,0 +1,69 @@
+import json
+import time
+
+import pytest
+
+from placegraph.runtime.desk import MAX_WAITING, Desk
+from placegraph.runtime.messages import Question
+
+
+class Asker:
+    """Stands where the bus's Request stands: a payload, and one reply."""
+
+    def __init__(self, payload: bytes = b'{"text": "cup", "id": "same"}') -> None:
+        self.payload, self.replies = payload, []
+
+    def reply(self, payload: bytes) -> None:
+        self.replies.append(json.loads(payload))
+
+
+@pytest.fixture
+def forwarded() -> list[tuple[int, Question]]:
+    return []
+
+
+def desk(forwarded: list, timeout_s: float = 60.0) -> Desk:
+    return Desk(lambda number, question: forwarded.append((number, question)), timeout_s)
+
+
+def test_each_asker_gets_its_own_answer_once(forwarded: list) -> None:
+    counter, askers = desk(forwarded), [Asker(), Asker()]
+    for asker in askers:
+        counter.take(asker)  # type: ignore[arg-type]
+    (first, question), (second, _) = forwarded
+    assert question.question_id == "same"
+    counter.answer(second, b'{"n": 2}')
+    counter.answer(first, b'{"n": 1}')
+    counter.answer(first, b'{"n": 3}')
+    assert [asker.replies for asker in askers] == [[{"n": 1}], [{"n": 2}]]
+
+
+def test_a_bad_request_is_answered_and_not_forwarded(forwarded: list) -> None:
+    asker = Asker(b"{}")
+    desk(forwarded).take(asker)  # type: ignore[arg-type]
+    assert asker.replies[0]["status"] == "error" and forwarded == []
+
+
+def test_too_many_are_told_so_and_a_place_gets_free_again(forwarded: list) -> None:
+    counter, askers = desk(forwarded), [Asker() for _ in range(MAX_WAITING + 1)]
+    for asker in askers:
+        counter.take(asker)  # type: ignore[arg-type]
+    assert len(forwarded) == MAX_WAITING and "busy" in askers[-1].replies[0]["error"]
+    counter.answer(forwarded[0][0], b"{}")
+    late = Asker()
+    counter.take(late)  # type: ignore[arg-type]
+    assert len(forwarded) == MAX_WAITING + 1 and late.replies == []
+    counter.close("the grounding node ended")
+    assert all(len(asker.replies) == 1 for asker in [*askers, late])
+    assert late.replies[0]["error"] == "the grounding node ended"
+
+
+def test_a_slow_node_is_answered_for(forwarded: list) -> None:
+    counter, asker = desk(forwarded, timeout_s=0.05), Asker()
+    counter.take(asker)  # type: ignore[arg-type]
+    deadline = time.monotonic() + 5
+    while not asker.replies and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert asker.replies[0]["error"] == "no answer within 0.05 s"
+    counter.answer(forwarded[0][0], b"{}")
+    assert len(asker.replies) == 1
