@@ -15,7 +15,12 @@ def opening_view(frames: bool) -> rrb.Blueprint:
     world = rrb.Spatial3DView(
         origin="world",
         name="World",
-        contents=["+ $origin/**", "- $origin/camera/image/depth", "- $origin/camera/image/detections"],
+        contents=[
+            "+ $origin/**",
+            "- $origin/camera/image/depth",
+            "- $origin/camera/image/detections",
+            "- $origin/overhead",
+        ],
         overrides={"world/path": so_far},
     )
     image = "world/camera/image"

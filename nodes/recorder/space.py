@@ -11,6 +11,7 @@ from placegraph.runtime import messages as m
 
 MAX_POINTS = 100_000  # drawn; the exact cloud lies in /messages
 POINT_RADIUS_M = 0.012
+OVERHEAD_M = 0.2  # over the camera
 TRUSTED, DOUBTED = (90, 200, 255), (255, 80, 60)
 
 
@@ -42,12 +43,17 @@ def draw_pose(picture: Picture, pose: m.Pose, pngs: dict[str, bytes]) -> None:
 
 
 def draw_map(picture: Picture, map_: m.Map, pngs: dict[str, bytes]) -> None:
-    """The cloud in its own colours and one named box for each object; both replace the former ones."""
+    """The cloud in its own colours and one named box for each object; both replace the former ones.
+
+    What lies over the camera's highest place has an entity of its own, which the opening view hides: one looks into
+    the rooms from above, and a ceiling would cover them.
+    """
     stride = max(1, -(-len(map_.points_world) // MAX_POINTS))
-    cloud = rr.Points3D(
-        map_.points_world[::stride], colors=map_.point_colors[::stride], radii=max(POINT_RADIUS_M, map_.voxel_m / 2)
-    )
-    picture.log("world/map", cloud)
+    points, colors = map_.points_world[::stride], map_.point_colors[::stride]
+    over_m = map_.camera_positions_world[:, 2].max(initial=-np.inf) + OVERHEAD_M
+    for path, part in (("world/map", points[:, 2] <= over_m), ("world/overhead", points[:, 2] > over_m)):
+        radius_m = max(POINT_RADIUS_M, map_.voxel_m / 2)
+        picture.log(path, rr.Points3D(points[part], colors=colors[part], radii=radius_m))
     picture.replace("objects", {f"world/objects/O{i}": box for i, box in _object_boxes(map_)})
 
 

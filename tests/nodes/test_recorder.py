@@ -307,8 +307,10 @@ def test_objects_are_named_boxes_and_vanish_with_the_next_map(play: Play) -> Non
 def test_an_empty_map_and_a_large_one(play: Play) -> None:
     (empty,) = play([map_of({}, points=0)])["/world/map"]
     assert empty["Points3D:positions"] == []
-    (large,) = play([map_of({}, points=250_001)])["/world/map"]
-    assert len(large["Points3D:positions"]) == 83_334
+    drawn = play([map_of({}, points=250_001)])
+    parts = [drawn[path][0]["Points3D:positions"] for path in ("/world/map", "/world/overhead")]
+    assert sum(map(len, parts)) == 83_334
+    assert max(point[2] for point in parts[0]) < min(point[2] for point in parts[1])
 
 
 def test_places_are_outlines_at_the_floor(play: Play) -> None:
