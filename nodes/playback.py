@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.runtime.messages import Keyframe, LastKeyframe, Message, all_kinds
+from placegraph.runtime.messages import Keyframe, LastKeyframe, Message, Pose, all_kinds
 from placegraph.runtime.node import Context, NodeConfig, Source
 from placegraph.runtime.recording import kinds_in, read
 
@@ -26,6 +26,7 @@ class Playback(Source):
     """Gives the recorded messages of its kinds, exact and in recorded order."""
 
     config_type: ClassVar[type[NodeConfig]] = PlaybackConfig
+    gives: tuple[type[Message], ...] = (Pose, Keyframe, LastKeyframe)
 
     def __init__(self, config: Any, context: Context) -> None:
         super().__init__(config, context)
@@ -35,7 +36,7 @@ class Playback(Source):
                 raise ConfigError(f"[nodes.playback] kinds: no message {name!r}; there are: {', '.join(known)}")
         if len(set(config.kinds)) != len(config.kinds) or not config.kinds:
             raise ConfigError(f"[nodes.playback] kinds: expected each kind once, at least one: {list(config.kinds)}")
-        self.gives: tuple[type[Message], ...] = tuple(known[name] for name in config.kinds)
+        self.gives = tuple(known[name] for name in config.kinds)
 
     def is_lossless(self) -> bool:
         """A recording can wait."""
@@ -63,6 +64,9 @@ class Playback(Source):
                 keyframes += 1
                 last = LastKeyframe(frame_id=message.frame_id, stamp_ns=message.stamp_ns, keyframes=keyframes)
             yield message
+            if self.ending:  # told to stop early: what follows still gets its last keyframe
+                ends = LastKeyframe in self.gives and not isinstance(message, LastKeyframe)
+                break
         if ends:
             yield last
 

@@ -141,3 +141,12 @@ def test_incomplete_adds_nothing_to_a_complete_recording(tmp_path: Path) -> None
 def test_without_the_last_keyframe_kind_none_is_asked_for(tmp_path: Path) -> None:
     node = playback(recorded(tmp_path, keyframe(0)), kinds=["Keyframe"])
     assert said(node) == [("Keyframe", 0)]
+
+
+def test_told_to_end_it_says_which_keyframe_was_the_last(tmp_path: Path) -> None:
+    node = playback(recorded(tmp_path, pose(0), keyframe(0), pose(2), keyframe(2), LAST))
+    given = []
+    for message in node.messages():
+        given.append((type(message).__name__, message.frame_id))
+        node.ending = isinstance(message, m.Keyframe)
+    assert given == [("Pose", 0), ("Keyframe", 0), ("LastKeyframe", 0)]
