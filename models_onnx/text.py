@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -16,13 +17,19 @@ from placegraph.runtime.errors import ModelError
 F32 = NDArray[np.float32]
 
 DIMENSIONS = 256  # of the embedding that travels in wordllama's wheel
+MOST_TEXTS = 8192  # departs: vectors kept, 1 kB each; RAM++ knows 4585 tags, and questions bring ever new words
 
 
 class TextEncoder:
-    """Text to unit vectors, offline; each text is encoded once and alone, so its vector never depends on others."""
+    """Text to unit vectors, offline; each text is encoded alone, so its vector never depends on others.
 
-    def __init__(self) -> None:
-        self._rows: dict[str, F32] = {}
+    The vectors of the texts used last are kept.
+    """
+
+    def __init__(self, most_texts: int = MOST_TEXTS) -> None:
+        """most_texts: how many vectors are kept, at least 1."""
+        self._most_texts = most_texts
+        self._rows: OrderedDict[str, F32] = OrderedDict()
 
     def encode(self, texts: Sequence[str]) -> F32:
         """Encode texts to (N, 256) unit rows; a zero row where a text has no letter or digit.
@@ -32,10 +39,17 @@ class TextEncoder:
         """
         rows = np.zeros((len(texts), DIMENSIONS), np.float32)
         for i, text in enumerate(texts):
-            if text not in self._rows:
-                self._rows[text] = _encode_one(text)
-            rows[i] = self._rows[text]
+            rows[i] = self._row(text)
         return rows
+
+    def _row(self, text: str) -> F32:
+        if text in self._rows:
+            self._rows.move_to_end(text)
+            return self._rows[text]
+        row = self._rows[text] = _encode_one(text)
+        if len(self._rows) > self._most_texts:
+            self._rows.popitem(last=False)
+        return row
 
 
 def _encode_one(text: str) -> F32:

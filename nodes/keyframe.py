@@ -22,7 +22,9 @@ class KeyframeConfig(NodeConfig):
     rotation_rad: float = Field(0.1, gt=0)  # departs: its 3 deg chooses nearly every frame of a hand-held camera
     period_s: float = Field(1.0, gt=0)  # departs: its 0.5 s; a camera that stands still sees little that is new
     in_flight: int = Field(4, ge=1)  # live: keyframes that perception may be behind
-    lost_after_s: float = Field(5.0, gt=0)  # live: a keyframe unfinished for so long died with its process
+    # live: a keyframe unfinished for so long died with its process; a frame without a pose for so long is forgotten,
+    # or frames would fill the memory while `pose` stands still
+    lost_after_s: float = Field(5.0, gt=0)
 
 
 class KeyframeNode(Node):
@@ -37,6 +39,7 @@ class KeyframeNode(Node):
     gives = (Keyframe, LastKeyframe)
     feedback = (Segments,)
     restartable: ClassVar[bool] = True
+    config: KeyframeConfig
 
     def __init__(self, config: Any, context: Context) -> None:
         super().__init__(config, context)
@@ -55,7 +58,7 @@ class KeyframeNode(Node):
             self._in_flight = {i: stamp for i, stamp in self._in_flight.items() if i > message.frame_id}
         elif isinstance(message, End):
             self._end = message
-        elif (joined := self._join.add(message)) is not None:
+        elif (joined := self._joined(message)) is not None:
             frame, pose = joined
             assert isinstance(frame, Frame) and isinstance(pose, Pose)
             self._last_seen = frame.frame_id
@@ -65,6 +68,11 @@ class KeyframeNode(Node):
             given.append(self._last_message(self._end))
             self._end = None
         return given
+
+    def _joined(self, message: Message) -> tuple[Message, ...] | None:
+        if isinstance(message, Frame) and not self.context.lossless:
+            self._join.forget_before(message.stamp_ns - round(self.config.lost_after_s * 1e9))
+        return self._join.add(message)
 
     def _is_worth(self, frame: Frame, pose: Pose) -> bool:
         if not pose.trusted:

@@ -13,11 +13,12 @@ from types import TracebackType
 from typing import Any
 
 import zenoh
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from placegraph.runtime.errors import ConfigError, QueryError
 
 CONNECT_TIMEOUT_MS = 10_000
+PROBE_TIMEOUT_S = 1.0
 
 
 class BusConfig(BaseModel):
@@ -26,7 +27,8 @@ class BusConfig(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
     endpoint: str = "tcp/127.0.0.1:7447"  # where the hub listens; another machine can reach it only if this says so
-    prefix: str = "placegraph"  # first part of every key: give each robot its own
+    # first part of every key: give each robot its own; letters, digits and "._-", parts separated by "/"
+    prefix: str = Field(default="placegraph", pattern=r"^[\w.-]+(/[\w.-]+)*$")
     multicast: bool = False  # answer and send Zenoh's discovery on the local network
     shared_memory: bool = False  # off: payloads in shared memory stay pinned when a taker is killed (FACTS 1)
 
@@ -131,7 +133,7 @@ class Bus:
             if text == b"Timeout":
                 raise QueryError(f"{name}: no reply within {timeout_s:g} s")
             return bytes(text)
-        raise QueryError(f"{name}: nobody answers at {self.config.endpoint}: is a run with a grounding node up?")
+        raise QueryError(f"{name}: nobody answers at {self.config.endpoint}: no run with a grounding node, or it ended")
 
     def declare_alive(self, name: str) -> None:
         """Hold a liveliness token until the session closes."""
@@ -168,10 +170,15 @@ def _refuse_taken_port(endpoint: str) -> None:
     if protocol != "tcp" or not port.isdigit() or int(port) == 0:
         return
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-        if probe.connect_ex((host.strip("[]"), int(port))) == 0:
-            raise ConfigError(
-                f"[bus] endpoint: {endpoint} is taken, another run may be up: stop it or set another endpoint"
-            )
+        probe.settimeout(PROBE_TIMEOUT_S)  # another machine's address may swallow packets
+        try:
+            taken = probe.connect_ex((host.strip("[]"), int(port))) == 0
+        except (OSError, OverflowError) as error:  # a name nobody knows, a port above 65535
+            raise ConfigError(f"[bus] endpoint: cannot listen on {endpoint}: {error}") from None
+    if taken:
+        raise ConfigError(
+            f"[bus] endpoint: {endpoint} is taken, another run may be up: stop it or set another endpoint"
+        )
 
 
 def free_endpoint() -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import graphlib
+import threading
 import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from placegraph.runtime.bus import BusConfig
 from placegraph.runtime.errors import ConfigError
@@ -25,11 +26,16 @@ class RunSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
-    out_dir: str = "out"  # runs are written to <out_dir>/<name>; relative to the current folder
-    threads: int = 1  # for each library that has threads of its own; more than 1 can change the last bits
+    out_dir: str = Field(
+        default="out", min_length=1
+    )  # runs are written to <out_dir>/<name>; relative to the current folder
+    threads: int = Field(
+        default=1, ge=1
+    )  # for each library that has threads of its own; more than 1 can change the last bits
     model_dirs: list[str] = []  # folders with weights, relative to the dataflow file
-    question_timeout_s: float = 30.0  # after this long a question is answered with an error
-    log_level: str = "INFO"
+    # after this long a question is answered with an error
+    question_timeout_s: float = Field(default=30.0, gt=0, allow_inf_nan=False, le=threading.TIMEOUT_MAX)
+    log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
 
 
 class RunConfig(BaseModel):
@@ -69,7 +75,7 @@ def packaged_names() -> list[str]:
 def _first_problem(error: ValidationError) -> str:
     first = error.errors()[0]
     section, *keys = [str(part) for part in first["loc"]]
-    return f"[{section}] {'.'.join(keys)}: {first['msg']}"
+    return f"[{section}]{' ' if keys else ''}{'.'.join(keys)}: {first['msg']}"
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ class Desk:
         self._forward, self._timeout_s = forward, timeout_s
         self._waiting: dict[int, tuple[Request, threading.Timer]] = {}
         self._asked = 0
+        self._closed_because = ""
         self._lock = threading.Lock()
 
     def take(self, request: Request) -> None:
@@ -28,9 +29,11 @@ class Desk:
         with self._lock:
             self._asked += 1
             number = self._asked
-            busy = len(self._waiting) >= MAX_WAITING
-        if busy:
-            request.reply(error_reply("", f"busy: {MAX_WAITING} questions are waiting"))
+            refusal = self._closed_because
+            if not refusal and len(self._waiting) >= MAX_WAITING:
+                refusal = f"busy: {MAX_WAITING} questions are waiting"
+        if refusal:
+            request.reply(error_reply("", refusal))
             return
         try:
             question = parse_request(request.payload, f"Q{number}")
@@ -53,9 +56,15 @@ class Desk:
             timer.cancel()
             request.reply(payload)
 
-    def close(self, reason: str) -> None:
-        """Reply to everybody who still waits."""
+    def is_waiting(self, number: int) -> bool:
+        """Whether the asker of a question still waits; after the time limit nobody does, and a step would be wasted."""
         with self._lock:
+            return number in self._waiting
+
+    def close(self, reason: str) -> None:
+        """Reply to everybody who still waits, and from now on to everybody who comes."""
+        with self._lock:
+            self._closed_because = reason
             numbers = list(self._waiting)
         for number in numbers:
             self.answer(number, error_reply("", reason))

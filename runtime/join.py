@@ -26,5 +26,11 @@ class Join:
             del self._waiting[frame_id]
         return tuple(found[kind] for kind in self._kinds)
 
+    def forget_before(self, stamp_ns: int) -> None:
+        """Forget incomplete sets that were captured earlier."""
+        for frame_id, found in list(self._waiting.items()):
+            if max(message.stamp_ns for message in found.values()) < stamp_ns:
+                del self._waiting[frame_id]
+
     def __len__(self) -> int:
         return len(self._waiting)

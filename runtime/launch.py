@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from placegraph.runtime.bus import Bus
@@ -25,6 +27,7 @@ logger = logging.getLogger(__name__)
 START_TIMEOUT_S = 120.0  # models are read from disk, on a small computer
 DRAIN_TIMEOUT_S = 60.0  # to finish what has arrived
 TERMINATE_TIMEOUT_S = 5.0
+TOKEN_TIMEOUT_S = 2.0
 LOG_TAIL_LINES = 12
 
 
@@ -69,8 +72,11 @@ class Launcher:
 
         self._bus.subscribe(deliver, "topic", TOPICS[kind].key)
 
-    def start(self) -> None:
-        """Start every process and, when all are ready, the source; raises PlacegraphError naming one that is not."""
+    def start(self, is_cancelled: Callable[[], bool] = lambda: False) -> None:
+        """Start every process and, when all are ready, the source.
+
+        Raises PlacegraphError naming a process that does not get ready, or as soon as `is_cancelled` says so.
+        """
         (self._out_dir / "log").mkdir(parents=True, exist_ok=True)
         for name in self._dataflow.nodes:
             self._spawn(name)
@@ -80,6 +86,8 @@ class Launcher:
                 self._changed.wait(0.1)
                 for name in missing:
                     self._raise_if_dead(name)
+                if is_cancelled():
+                    raise PlacegraphError(f"stopped while {', '.join(missing)} got ready: nothing was mapped")
                 if time.monotonic() > deadline:
                     raise PlacegraphError(f"not ready after {START_TIMEOUT_S:g} s: {', '.join(missing)}")
         self._bus.put(b"start", "control")
@@ -87,10 +95,12 @@ class Launcher:
     def poll(self) -> None:
         """Notice processes that ended: restart them or raise PlacegraphError naming the node. Call often."""
         for name, process in self._processes.items():
-            if name in self._stopped or name in self._restart_at or process.poll() is None:
+            if name in self._restart_at or process.poll() is None:
+                continue
+            if name in self._stopped and process.returncode == 0:
                 continue
             node = self._dataflow.nodes[name]
-            if self._dataflow.context.lossless or not node.restartable:
+            if name in self._stopped or self._dataflow.context.lossless or not node.restartable:
                 self._raise_if_dead(name)
             delay_s = self._budgets[name].next_delay_s(time.monotonic())
             if delay_s is None:
@@ -123,6 +133,9 @@ class Launcher:
             if not self._wait(process, DRAIN_TIMEOUT_S):
                 logger.warning("%s did not finish within %g s", name, DRAIN_TIMEOUT_S)
                 self._kill(process)
+            # its token goes after its last message: what it gave is on its way before the next node is told to stop
+            with self._changed:
+                self._changed.wait_for(lambda name=name: name not in self._alive, TOKEN_TIMEOUT_S)  # type: ignore[misc]
 
     def kill(self) -> None:
         """End everything at once: what is in flight is lost."""
@@ -130,8 +143,9 @@ class Launcher:
         for process in self._processes.values():
             if process.poll() is None:
                 process.terminate()
+        deadline = time.monotonic() + TERMINATE_TIMEOUT_S
         for process in self._processes.values():
-            if not self._wait(process, TERMINATE_TIMEOUT_S):
+            if not self._wait(process, max(0.0, deadline - time.monotonic())):
                 self._kill(process)
 
     def pids(self) -> dict[str, int]:
@@ -150,7 +164,7 @@ class Launcher:
             log_level=config.run.log_level,
         )
         environment = os.environ | {"OMP_NUM_THREADS": str(self._dataflow.context.threads)}
-        with self._log_path(name).open("ab") as log_file:
+        with self._log_path(name).open("ab") as log_file, _interrupts_blocked():
             process = subprocess.Popen(
                 [sys.executable, "-m", "placegraph.runtime.process"],
                 stdin=subprocess.PIPE,
@@ -210,3 +224,14 @@ class Launcher:
                 if process.stdin is not None:
                     process.stdin.close()
             self._bus.close()
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    # Ctrl-C reaches every process of the terminal. A child born with this mask does not even see one that comes while
+    # it still imports; this process gets it on another thread or when the mask is lifted.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

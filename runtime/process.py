@@ -150,6 +150,8 @@ class Process:
     def _take(self, parcel: Parcel) -> None:
         self._recent.append(parcel)
         asked = self.node.serves is not None and parcel.kind is self.node.serves[0]
+        if asked and not self._desk.is_waiting(parcel.sequence):
+            return
         if not asked:
             self._check_order(parcel)
         message = decode(parcel.kind, parcel.payload)
@@ -201,11 +203,14 @@ class Process:
     def _write_crash(self, trace: str) -> None:
         if not self.spec.context.out_dir:
             return
-        folder = Path(self.spec.context.out_dir) / "crash"
-        folder.mkdir(parents=True, exist_ok=True)
+        path = Path(self.spec.context.out_dir) / "crash" / f"{self.spec.node}.rec"
         parcels = [[p.kind.__name__, p.payload] for p in self._recent]
         record = [self.spec.model_dump_json(), trace, parcels]
-        (folder / f"{self.spec.node}.rec").write_bytes(msgpack.packb(record))
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(msgpack.packb(record))
+        except OSError as error:  # a full disk may be what it died of: that error must not be hidden by this one
+            logger.error("no whole crash file: %s", error)
 
     def report_health(self) -> None:
         """Publish Health once a second and at the end; runs in its own thread."""
@@ -244,6 +249,7 @@ def main() -> int:
     log.configure(spec.node, spec.log_level)
     threading.Thread(target=_die_with_launcher, daemon=True).start()
     node: Node | None = None
+    status = 1
     try:
         node = build_node(spec.node, spec.settings, spec.context)
         node.start()
@@ -264,16 +270,18 @@ def main() -> int:
                 process.end()
                 reporter.join()
         logger.info("stopped after %d steps", process.stats.steps)
-        return 0
+        status = 0
     except PlacegraphError as error:
         logger.error("%s: %s", type(error).__name__, error)
-        return 1
     except Exception:
         logger.exception("step failed")
-        return 1
-    finally:
+    try:
         if node is not None:
             node.stop()
+    except PlacegraphError as error:  # a recording that could not be finished
+        logger.error("%s: %s", type(error).__name__, error)
+        status = 1
+    return status
 
 
 if __name__ == "__main__":

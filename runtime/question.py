@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from placegraph.runtime.messages import Question
 
 MAX_TEXT = 500  # characters; longer is not a request but a document
 MAX_CANDIDATES = 50
-MODES = ("program",)
+MAX_COORDINATE_M = 1e6  # no building is larger, and no sum of squares overflows
+MODES = ("program", "model")  # rules and the model where they leave off; the model's own parse and choice
 FIELDS = {"text", "id", "k", "mode", "viewpoint"}
 
 
@@ -23,7 +23,7 @@ def parse_request(payload: bytes, fallback_id: str = "") -> Question:
         request = json.loads(payload.decode("utf-8"))
     except UnicodeDecodeError:
         raise QueryError("the request is not UTF-8") from None
-    except (json.JSONDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # ValueError: also a number of thousands of digits
         raise QueryError('the request is not JSON; expected {"text": "..."}') from None
     if not isinstance(request, dict):
         raise QueryError(f'expected an object like {{"text": "..."}}, got {type(request).__name__}')
@@ -48,6 +48,9 @@ def make_question(
         raise QueryError(f"text: at most {MAX_TEXT} characters, got {len(text)}")
     if not isinstance(question_id, str) or len(question_id) > 100:
         raise QueryError("id: expected at most 100 characters of text")
+    for field, value in (("text", text), ("id", question_id)):
+        if any("\ud800" <= character <= "\udfff" for character in value):  # JSON can spell them, UTF-8 cannot
+            raise QueryError(f"{field}: half of a surrogate pair is no character")
     if type(k) is not int or not 1 <= k <= MAX_CANDIDATES:
         raise QueryError(f"k: expected a whole number from 1 to {MAX_CANDIDATES}")
     if mode not in MODES:
@@ -67,7 +70,7 @@ def _viewpoint(value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     if value is None:
         return np.full(3, np.nan)
     numbers = value if isinstance(value, (list, tuple)) else []
-    if len(numbers) != 3 or not all(type(v) in (int, float) and math.isfinite(v) for v in numbers):
+    if len(numbers) != 3 or not all(type(v) in (int, float) and abs(v) <= MAX_COORDINATE_M for v in numbers):
         raise QueryError("viewpoint: expected [x, y, z] in metres, world frame")
     return np.array(numbers, float)
 

@@ -15,7 +15,7 @@ from placegraph.runtime.messages import Answer, Graph
 from placegraph.runtime.node import Context, build_node
 from placegraph.runtime.question import make_question
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.map_folder import RUN, find_graph, read_run
+from placegraph.tools.map_folder import RUN, find_graph, read_config
 
 NOT_FOUND = 3
 
@@ -29,17 +29,22 @@ def ask(
     ],
     as_json: Annotated[bool, typer.Option("--json", help="Print the reply as JSON (README, Asking).")] = False,
     k: Annotated[int, typer.Option(help="How many candidates to list.")] = 5,
+    mode: Annotated[str, typer.Option(help="program: by rules first; model: by the language model.")] = "program",
     viewpoint: Annotated[str, typer.Option(help="Where the asker stands: x,y,z in metres, world frame.")] = "",
     endpoint: Annotated[str, typer.Option(help="live: where the hub listens.")] = BusConfig().endpoint,
     prefix: Annotated[str, typer.Option(help="live: first part of the keys.")] = BusConfig().prefix,
     timeout_s: Annotated[float, typer.Option(help="live: how long to wait for the reply.")] = 35.0,
 ) -> None:
-    """Find an object. Exit status: 0 found, 3 not in the map, 1 the question could not be answered."""
+    """Find an object in a saved map or in the running system.
+
+    Exit status: 0 found, 3 not in the map, 1 the question could not be answered, 2 wrong usage.
+    """
     position = _numbers(viewpoint) if viewpoint else None
-    question = make_question(text, question_id="Q1", k=k, viewpoint=position)  # refuses what no map can answer
+    # refuses what no map can answer
+    question = make_question(text, question_id="Q1", k=k, mode=mode, viewpoint=position)
     began = time.monotonic()
     if where == "live":
-        request = {"text": question.text, "k": k} | ({"viewpoint": position} if position else {})
+        request = {"text": question.text, "k": k, "mode": mode} | ({"viewpoint": position} if position else {})
         with Bus(BusConfig(endpoint=endpoint, prefix=prefix)) as bus:
             reply = json.loads(bus.ask(json.dumps(request).encode(), timeout_s, "ask"))
     else:
@@ -52,11 +57,12 @@ def ask(
 
 def _ask_map(path: Path, question: Any) -> dict[str, Any]:
     graph = SceneGraph.load(find_graph(path))
-    settings, context = {}, Context()
+    settings: dict[str, Any] = {}
+    context = Context()
     if path.is_dir() and (path / RUN).exists():  # ask the map the way its run would have answered
-        config = read_run(path)["config"]
-        settings = config["nodes"].get("grounding", {})
-        context = Context(model_dirs=tuple(config["run"]["model_dirs"]), threads=config["run"]["threads"])
+        config = read_config(path)
+        settings = config.nodes.get("grounding", {})
+        context = Context(model_dirs=tuple(config.run.model_dirs), threads=config.run.threads)
     node = build_node("grounding", settings, context)
     try:
         node.start()
@@ -72,9 +78,10 @@ def _ask_map(path: Path, question: Any) -> dict[str, Any]:
 
 def _numbers(text: str) -> list[float]:
     try:
-        return [float(part) for part in text.split(",")]
+        x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise QueryError(f"viewpoint: expected x,y,z in metres, got {text!r}") from None
+        raise QueryError(f"viewpoint: expected x,y,z in metres, world frame, got {text!r}") from None
+    return [x, y, z]
 
 
 def _in_words(reply: dict[str, Any]) -> str:

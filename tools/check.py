@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from placegraph.runtime.config import build, read
-from placegraph.tools.run import with_settings
+from placegraph.tools.run import source_settings, with_settings
 
 
 def check(
@@ -18,13 +20,16 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Print the effective settings as JSON.")] = False,
 ) -> None:
     """Build every node without running it, load its models, and print the effective settings."""
-    settings = with_settings(read(config), {"camera": {"path": str(source)}} if source else {})
-    dataflow = build(settings)
-    for node in dataflow.nodes.values():
-        try:
-            node.start()
-        finally:
-            node.stop()
+    os.environ.setdefault("DEPTHAI_LEVEL", "error")  # its warnings go to standard output, amid our JSON
+    settings = read(config)
+    settings = with_settings(settings, {"camera": source_settings(settings, source)})
+    with tempfile.TemporaryDirectory() as folder:  # a recorder opens its file
+        dataflow = build(settings, Path(folder))
+        for node in dataflow.nodes.values():
+            try:
+                node.start()
+            finally:
+                node.stop()
     effective = {name: node.config.model_dump(mode="json") for name, node in dataflow.nodes.items()}
     if as_json:
         print(json.dumps({"run": settings.run.model_dump(), "bus": settings.bus.model_dump(), "nodes": effective}))

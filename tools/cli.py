@@ -9,7 +9,20 @@ import typer
 
 from placegraph.runtime import log
 from placegraph.runtime.errors import ConfigError, PlacegraphError
-from placegraph.tools import ask, check, doctor, evaluate, graph, models, record, replay, run, view
+from placegraph.tools import (
+    ask,
+    bench,
+    check,
+    doctor,
+    evaluate,
+    graph,
+    models,
+    record,
+    references,
+    replay,
+    run,
+    view,
+)
 
 app = typer.Typer(
     help="Hierarchical 3D scene graphs from RGB-D frames, and answers to questions about them.",
@@ -27,6 +40,8 @@ COMMANDS: tuple[Callable[..., None], ...] = (
     view.view,
     evaluate.evaluate,
     doctor.doctor,
+    bench.bench,
+    references.references,
 )
 for command in COMMANDS:
     app.command()(command)
@@ -37,7 +52,7 @@ def main() -> None:
     """Entry point: exit status 2 for wrong settings, 1 for other errors that are ours; anything else is a bug."""
     log.configure("placegraph", "WARNING")
     try:
-        app()
+        app(prog_name="placegraph")
     except PlacegraphError as error:
         print(f"placegraph: {error}", file=sys.stderr)
         sys.exit(2 if isinstance(error, ConfigError) else 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import platform
 import shutil
 import sys
@@ -27,7 +28,10 @@ class Finding:
 
 
 def doctor(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False) -> None:
-    """Check this machine. Exit status: 0 the main job can run, 1 it cannot."""
+    """Look at this machine: what placegraph needs, what is there, what is missing for what.
+
+    Exit status: 0 the main job can run, 1 it cannot.
+    """
     findings = [*_machine(), *_packages(), _bus(), _language_model(), _camera()]
     if as_json:
         print(json.dumps([asdict(finding) for finding in findings]))
@@ -90,6 +94,7 @@ def _language_model() -> Finding:
 def _camera() -> Finding:
     if importlib.util.find_spec("depthai") is None:
         return Finding("camera", "note", "no depthai: pip install 'placegraph[oak]' for a live OAK-D")
+    os.environ.setdefault("DEPTHAI_LEVEL", "error")  # its warnings go to standard output, amid our JSON
     from placegraph.nodes.camera.oak import find_device
     from placegraph.runtime.errors import SourceError
 

@@ -15,7 +15,9 @@ from placegraph.tools.map_folder import find_graph
 
 
 def graph(
-    map_folder: Annotated[Path | None, typer.Argument(metavar="[MAP]", help="Print this map's graph instead.")] = None,
+    map_folder: Annotated[
+        Path | None, typer.Argument(metavar="MAP", help="A map folder or graph file: print its graph instead.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the graph's canonical JSON.")] = False,
 ) -> None:
     """Print which node takes and gives which message; with MAP, its building, floors, rooms, locations, objects."""

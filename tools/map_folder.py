@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import platform
 import subprocess
+import time
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from placegraph.runtime.config import Dataflow, RunConfig
 from placegraph.runtime.errors import ConfigError, SchemaError
@@ -31,6 +33,26 @@ PACKAGES = (
 )
 
 
+class Clock:
+    """Times of one run: `start_s` until every node is ready, `mapping_s` from then to the last graph."""
+
+    def __init__(self) -> None:
+        self.start_s = self.mapping_s = 0.0
+        self._since = time.monotonic()
+
+    def begin(self) -> None:
+        """The nodes are about to be started."""
+        self._since = time.monotonic()
+
+    def ready(self) -> None:
+        """Every node is ready; the source starts."""
+        self.start_s, self._since = time.monotonic() - self._since, time.monotonic()
+
+    def done(self) -> None:
+        """The last graph is there; only the first call counts."""
+        self.mapping_s = self.mapping_s or time.monotonic() - self._since
+
+
 class Collector:
     """Keeps what the map folder needs out of the messages of a run."""
 
@@ -38,6 +60,8 @@ class Collector:
         self._expects_graph = dataflow.giver(Graph) is not None
         self._expects_names = dataflow.giver(PlaceNames) is not None
         self.ended = False
+        self._frames_of_source = 0
+        self.clock = Clock()
         self.poses: list[Pose] = []
         self.map: Map | None = None
         self.graph: Graph | None = None
@@ -51,7 +75,12 @@ class Collector:
         elif isinstance(message, Graph):
             self.graph = message
         elif isinstance(message, End):
-            self.ended = True
+            self.ended, self._frames_of_source = True, message.frames
+
+    @property
+    def frames(self) -> int:
+        """How many frames the source gave; of a recording that is played back, those it knows a pose of."""
+        return self._frames_of_source or len(self.poses)
 
     @property
     def complete(self) -> bool:
@@ -102,10 +131,22 @@ def write_run(folder: Path, config: RunConfig, effective: dict[str, Any], summar
 def read_run(folder: Path) -> dict[str, Any]:
     """Read run.json; raises SchemaError."""
     try:
-        record: dict[str, Any] = json.loads((folder / RUN).read_text())
-    except (OSError, json.JSONDecodeError) as error:
+        record = json.loads((folder / RUN).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
         raise SchemaError(f"{folder / RUN}: cannot read: {error}") from None
+    if not isinstance(record, dict):
+        raise SchemaError(f"{folder / RUN}: expected an object, found {type(record).__name__}")
     return record
+
+
+def read_config(folder: Path) -> RunConfig:
+    """The dataflow that a run.json tells of; raises SchemaError."""
+    try:
+        return RunConfig.model_validate(read_run(folder).get("config"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(["config", *map(str, first["loc"])])
+        raise SchemaError(f"{folder / RUN}: {where}: {first['msg']}; written by another version?") from None
 
 
 def find_graph(path: Path) -> Path:
@@ -133,8 +174,10 @@ def read_trajectory(path: Path) -> dict[int, NDArray[np.float64]]:
     """TUM file to stamp_ns -> (3,) position in metres; raises SchemaError naming the line."""
     found: dict[int, NDArray[np.float64]] = {}
     try:
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
+        raise SchemaError(f"{path}: cannot read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
         raise SchemaError(f"{path}: cannot read: {error}") from None
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):

@@ -30,6 +30,7 @@ class Progress:
     def __enter__(self) -> Progress:
         if not self._quiet and self._console.is_terminal:
             self._live.start()
+            self._live.update(f"starting {', '.join(self._dataflow.nodes)} ...", refresh=True)
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -42,7 +43,7 @@ class Progress:
 
     def say(self, text: str) -> None:
         """Print a line beside the table."""
-        self._console.print(text, highlight=False)
+        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     def refresh(self) -> None:
         """Show the newest reports."""
@@ -67,7 +68,7 @@ class Progress:
             rate = f"[yellow]{h.rate_hz:.1f}[/]" if self._is_slow(name, h) else f"{h.rate_hz:.1f}"
             drops = f"[red]{h.drops}[/]" if h.drops else "0"
             times = f"{h.step_p50_ms:.1f}", f"{h.step_p95_ms:.1f}"
-            table.add_row(name, str(h.steps), rate, *times, str(h.queue), drops, f"{h.memory_mb:.0f}")
+            table.add_row(name, str(h.steps), rate, *times, str(h.queue), drops, _megabytes(h.memory_mb))
         return table
 
     def _is_slow(self, name: str, health: Health) -> bool:
@@ -78,21 +79,31 @@ class Progress:
 
     def print_summary(self, summary: dict[str, Any]) -> None:
         """Numbers of the whole run, on standard output."""
-        console = Console(highlight=False)
+        console = Console(highlight=False, soft_wrap=True)  # a terminal wraps by itself; a file keeps whole lines
         table = Table("node", *(_right(title) for title in ("steps", "p50 ms", "p95 ms", "dropped", "MB")))
         for name, n in summary["nodes"].items():
-            table.add_row(name, *(str(n[key]) for key in ("steps", "p50_ms", "p95_ms", "drops", "memory_mb")))
+            times = f"{n['p50_ms']:.1f}", f"{n['p95_ms']:.1f}"
+            table.add_row(name, str(n["steps"]), *times, str(n["drops"]), _megabytes(n["memory_mb"]))
         console.print(table)
+        kept = f" ({_counted(summary['keyframes'], 'keyframe')}, {summary['untrusted_poses']} untrusted)"
         console.print(
-            f"{summary['frames']} frames ({summary['keyframes']} keyframes, {summary['untrusted_poses']} untrusted)"
-            f" in {summary['seconds']} s: {summary['frames_per_s']} frames per second, start and stop included"
+            f"{_counted(summary['frames'], 'frame')}{kept if 'pose' in summary['nodes'] else ''}"
+            f" in {summary['mapping_s']} s: {summary['frames_per_s']} frames per second; start {summary['start_s']} s"
         )
         if summary["trajectory"]:
             console.print(
                 "trajectory: ATE rmse {ate_rmse_m} m, max {ate_max_m} m over {path_m} m".format(**summary["trajectory"])
             )
         if "graph" in summary:
-            console.print("graph: " + ", ".join(f"{count} {layer}s" for layer, count in summary["graph"].items()))
+            console.print("graph: " + ", ".join(_counted(count, layer) for layer, count in summary["graph"].items()))
+
+
+def _megabytes(memory_mb: float) -> str:
+    return f"{memory_mb:.0f}" if memory_mb else "-"  # inline: one process for all nodes, so none has a share
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def _right(title: str) -> Any:

@@ -9,7 +9,8 @@ import typer
 
 from placegraph.runtime.config import read
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.run import run_dataflow, with_settings
+from placegraph.tools.run import run_dataflow, source_settings, with_settings
+from placegraph.tools.view import RECORDING
 
 
 def record(
@@ -19,7 +20,7 @@ def record(
     out: Annotated[Path, typer.Option(help="Folder for the recording (run.rrd).")],
     source: Annotated[Path | None, typer.Option(help="Data set folder, for a camera that reads one.")] = None,
     limit: Annotated[int, typer.Option(min=0, help="Stop after so many frames (0: all, or until Ctrl-C).")] = 0,
-    quiet: Annotated[bool, typer.Option(help="No progress table.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress table.")] = False,
 ) -> None:
     """Record a camera's frames; `placegraph run CONFIG --source OUT/run.rrd` maps them later."""
     settings = read(config)
@@ -27,9 +28,9 @@ def record(
         raise ConfigError(f"{config}: there is no [nodes.camera] to record")
     nodes: dict[str, dict[str, Any]] = {
         "camera": settings.nodes["camera"],
-        "recorder": settings.nodes.get("recorder", {}) | {"frames": True},
+        "recorder": settings.nodes.get("recorder", {}) | {"frames": True, "file": RECORDING},
     }
-    overrides: dict[str, Any] = ({"path": str(source)} if source else {}) | ({"limit": limit} if limit else {})
+    overrides = source_settings(settings, source) | ({"limit": limit} if limit else {})
     only_camera = with_settings(settings.model_copy(update={"nodes": nodes}), {"camera": overrides})
     folder = run_dataflow(only_camera, config.stem, out, inline=False, quiet=quiet)
-    print(f"\nrecording  {folder / 'run.rrd'}")
+    print(f"\nrecording  {folder / RECORDING}\nmap it     placegraph run {config} --source {folder / RECORDING}")

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import json
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
 import msgpack
 import typer
+from pydantic import ValidationError
 
 from placegraph.runtime import log, messages
 from placegraph.runtime.codec import decode
 from placegraph.runtime.config import RunConfig, read
-from placegraph.runtime.errors import ConfigError, SchemaError
-from placegraph.runtime.node import Context, build_node
-from placegraph.tools.map_folder import RUN, read_run
+from placegraph.runtime.errors import ConfigError, SchemaError, SourceError
+from placegraph.runtime.node import build_node
+from placegraph.runtime.process import ProcessSpec
+from placegraph.tools.map_folder import RUN, read_config
 from placegraph.tools.run import run_dataflow
 
 BEFORE_KEYFRAMES = ("camera", "pose", "keyframe")
@@ -26,8 +28,8 @@ def replay(
         Path | None, typer.Option(help="Dataflow file (default: the run.json beside the recording).")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Map folder to write (default: out/replay-<number>).")] = None,
-    inline: Annotated[bool, typer.Option(help="One thread instead of a process for each node.")] = False,
-    quiet: Annotated[bool, typer.Option(help="No progress table.")] = False,
+    inline: Annotated[bool, typer.Option("--inline", help="One thread instead of a process for each node.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress table.")] = False,
 ) -> None:
     """Run everything behind the keyframes again from a recording: same recording, same graph.
 
@@ -36,6 +38,8 @@ def replay(
     if recording.suffix == ".rec":
         replay_crash(recording)
         return
+    if not recording.is_file():
+        raise SourceError(f"{recording}: no such recording")
     settings = read(config) if config else _settings_of(recording)
     nodes = {name: values for name, values in settings.nodes.items() if name not in BEFORE_KEYFRAMES}
     nodes["playback"] = {"path": str(recording.resolve())}
@@ -46,25 +50,37 @@ def replay(
 def _settings_of(recording: Path) -> RunConfig:
     if not (recording.parent / RUN).exists():
         raise ConfigError(f"{recording}: there is no {RUN} beside it; name a dataflow file with --config")
-    return RunConfig.model_validate(read_run(recording.parent)["config"])
+    return read_config(recording.parent)
 
 
 def replay_crash(path: Path) -> None:
     """Step the kept messages of a crash file here; the same error comes out unless it depends on older state."""
+    spec, trace, kept = _read_crash(path)
+    log.configure(spec.node, "DEBUG")
+    print(f"{spec.node} ended with:\n{trace}")
+    with tempfile.TemporaryDirectory() as folder:  # the run's own would be written over: the recorder opens its file
+        node = build_node(spec.node, spec.settings, spec.context.model_copy(update={"out_dir": folder}))
+        try:
+            node.start()
+            for message in kept:
+                print(f"step {type(message).__name__} of frame {message.frame_id}")
+                for given in node.step(message):
+                    print(f"  gives {type(given).__name__} of frame {given.frame_id}")
+        finally:
+            node.stop()
+
+
+def _read_crash(path: Path) -> tuple[ProcessSpec, str, list[messages.Message]]:
+    """What the shell wrote of a node's end: its spec, the traceback, and the messages that led to it."""
+    kinds = {kind.__name__: kind for kind in messages.all_kinds()}
     try:
-        spec_text, trace, parcels = msgpack.unpackb(path.read_bytes())
-        spec = json.loads(spec_text)
-    except (OSError, ValueError, msgpack.UnpackException) as error:
-        raise SchemaError(f"{path}: not a crash file: {error}") from None
-    log.configure(spec["node"], "DEBUG")
-    print(f"{spec['node']} ended with:\n{trace}")
-    node = build_node(spec["node"], spec["settings"], Context.model_validate_json(json.dumps(spec["context"])))
-    try:
-        node.start()
-        for name, payload in parcels:
-            message = decode(getattr(messages, name), payload)
-            print(f"step {name} of frame {message.frame_id}")
-            for given in node.step(message):
-                print(f"  gives {type(given).__name__} of frame {given.frame_id}")
-    finally:
-        node.stop()
+        spec, trace, parcels = msgpack.unpackb(path.read_bytes())
+        kept = [decode(kinds[name], payload) for name, payload in parcels]
+        return ProcessSpec.model_validate_json(spec), str(trace), kept
+    except OSError as error:
+        raise SchemaError(f"{path}: cannot read: {error.strerror}") from None
+    except SchemaError as error:
+        raise SchemaError(f"{path}: {error}") from None
+    except (ValidationError, ValueError, TypeError, KeyError, msgpack.UnpackException) as error:
+        first = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise SchemaError(f"{path}: not a crash file: {first}") from None

@@ -99,11 +99,20 @@ def _decode(path: Path, flag: int) -> NDArray[Any]:
         data = np.fromfile(path, np.uint8)
     except OSError as error:
         raise SourceError(f"{path}: cannot be read: {_reason(error)}") from None
-    # an empty buffer makes OpenCV raise instead of returning None
-    image = cv2.imdecode(data, flag) if data.size else None
+    # refused before decoding: OpenCV fills what is missing of some cut files, and libpng prints a line of its own
+    image = cv2.imdecode(data, flag) if _is_whole(data.tobytes()) else None
     if image is None:
         raise SourceError(f"{path}: not a whole image ({data.size} bytes): truncated or damaged")
     return np.asarray(image)
+
+
+def _is_whole(data: bytes) -> bool:
+    """Whether a PNG or JPEG has its end mark; other formats are left to their decoder, nothing is no image."""
+    if data.startswith(b"\x89PNG"):
+        return data.endswith(b"IEND\xaeB`\x82")
+    if data.startswith(b"\xff\xd8"):
+        return b"\xff\xd9" in data[-64:]  # some cameras pad after the mark
+    return len(data) > 0
 
 
 def _reason(error: Exception) -> str:

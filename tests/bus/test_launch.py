@@ -69,7 +69,9 @@ def test_stop_drains_and_ends_every_process_with_status_0(bus_config, tmp_path, 
         )
     assert not any(process.is_running() for process in processes)
     logs = {path.stem: path.read_text() for path in (tmp_path / "log").iterdir()}
-    assert len(logs) == 4 and all("stopped after" in text for text in logs.values())
+    assert len(logs) == 4
+    for name, text in logs.items():  # the last report was waited for
+        assert f"stopped after {health[name].steps} steps" in text
 
 
 def test_a_node_that_dies_in_a_replay_ends_the_run_and_is_named(bus_config, tmp_path, wait_until) -> None:
@@ -112,6 +114,47 @@ def test_a_process_that_cannot_start_is_named_with_its_log(bus_config, tmp_path)
         launcher.start()
 
 
+def test_a_start_can_be_cancelled(bus_config, tmp_path) -> None:
+    with (
+        Launcher(flow(bus_config, tmp_path), tmp_path) as launcher,
+        pytest.raises(PlacegraphError, match=r"stopped while camera, .* got ready: nothing was mapped"),
+    ):
+        launcher.start(lambda: True)
+
+
+def test_ctrl_c_does_not_reach_a_child_that_still_starts(bus_config, tmp_path, wait_until) -> None:
+    dataflow = flow(bus_config, tmp_path)
+    (tmp_path / "log").mkdir()
+    with Launcher(dataflow, tmp_path) as launcher:
+        for name in dataflow.nodes:
+            launcher._spawn(name)
+            os.kill(launcher.pids()[name], signal.SIGINT)
+        wait_until(lambda: (launcher.poll(), launcher._alive == set(dataflow.nodes))[1], "all are ready")
+        assert not any(path.read_text().count("KeyboardInterrupt") for path in (tmp_path / "log").iterdir())
+
+
+def test_nodes_that_hang_are_killed_together_not_one_after_the_other(bus_config, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("placegraph.runtime.launch.TERMINATE_TIMEOUT_S", 1.5)
+    with Launcher(flow(bus_config, tmp_path), tmp_path) as launcher:
+        launcher.start()
+        for pid in launcher.pids().values():
+            os.kill(pid, signal.SIGSTOP)
+        began = time.monotonic()
+        launcher.kill()
+        assert time.monotonic() - began < 3.0  # four times 1.5 s otherwise
+
+
+def test_a_source_that_fails_while_it_ends_is_named(bus_config, tmp_path, wait_until) -> None:
+    with Launcher(flow(bus_config, tmp_path, limit=0), tmp_path) as launcher:
+        launcher.start()
+        camera = launcher.pids()["camera"]
+        os.kill(camera, signal.SIGSTOP)
+        launcher.stop_source()
+        os.kill(camera, signal.SIGKILL)
+        with pytest.raises(PlacegraphError, match="camera was killed by signal 9"):
+            wait_until(launcher.poll, "the death is noticed", 5.0)
+
+
 def test_children_end_when_their_launcher_is_killed(tmp_path, wait_until) -> None:
     code = (
         "import sys, time\nfrom pathlib import Path\n"
@@ -139,7 +182,8 @@ def test_children_end_when_their_launcher_is_killed(tmp_path, wait_until) -> Non
 def test_an_interrupted_run_ends_in_order_and_leaves_nothing(tmp_path, number, bus_config, wait_until) -> None:
     config = tmp_path / "flow.toml"
     config.write_text(
-        f'[bus]\nendpoint = "{bus_config.endpoint}"\n[nodes.camera]\nsource = "synthetic"\nrealtime = true\n[nodes.pose]\n'
+        f'[bus]\nendpoint = "{bus_config.endpoint}"\n'
+        '[nodes.camera]\nsource = "synthetic"\nrealtime = true\n[nodes.pose]\n'
     )
     command = [sys.executable, "-m", "placegraph.tools.cli", "run", str(config), "--out", str(tmp_path / "out")]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

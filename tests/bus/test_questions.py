@@ -65,7 +65,10 @@ def test_the_command_gives_the_same_object_live_and_from_the_map(mapped: tuple[s
     endpoint, folder = mapped
     ask = [sys.executable, "-m", "placegraph.tools.cli", "ask"]
     live = subprocess.run(
-        [*ask, "live", "where is the table", "--json", "--endpoint", endpoint], capture_output=True, text=True, timeout=90
+        [*ask, "live", "where is the table", "--json", "--endpoint", endpoint],
+        capture_output=True,
+        text=True,
+        timeout=90,
     )
     question = [*ask, str(folder), "where is the table", "--json"]
     saved = subprocess.run(question, capture_output=True, text=True, timeout=90)

@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 
+from placegraph.models_onnx import text
 from placegraph.models_onnx.text import DIMENSIONS, TextEncoder
 
 
@@ -39,6 +40,18 @@ def test_a_caller_cannot_change_the_cache():
     encoder = TextEncoder()
     encoder.encode(["cup"])[:] = 0
     assert encoder.encode(["cup"]).any()
+
+
+def test_the_texts_used_last_are_kept_and_no_more(monkeypatch):
+    encoded = []
+    one = text._encode_one
+    monkeypatch.setattr(text, "_encode_one", lambda words: encoded.append(words) or one(words))
+    encoder = TextEncoder(most_texts=2)
+    first = encoder.encode(["cup", "sofa", "cup", "vase", "cup"])  # vase takes the place of sofa
+    assert encoded == ["cup", "sofa", "vase"]
+    again = encoder.encode(["sofa", "cup", "vase"])
+    assert encoded == ["cup", "sofa", "vase", "sofa", "vase"]
+    np.testing.assert_array_equal(again, first[[1, 0, 3]])
 
 
 def test_loading_leaves_logging_alone():

@@ -18,11 +18,19 @@ def written(folder: Path, text: str) -> Path:
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("", r"\[nodes\] : Field required"),
+        ("", r"\[nodes\]: Field required"),
         ("[nodes", "flow.toml: "),
         ("[run]\nthreds = 2\n[nodes.camera]", r"\[run\] threds: Extra inputs are not permitted"),
         ('[bus]\nmulticast = "yes"\n[nodes.camera]', r"\[bus\] multicast: Input should be a valid boolean"),
-        ("[extra]\n[nodes.camera]", r"\[extra\] : Extra inputs"),
+        ("[extra]\n[nodes.camera]", r"\[extra\]: Extra inputs"),
+        ('[run]\nlog_level = "LOUD"\n[nodes.camera]', r"\[run\] log_level: Input should be 'DEBUG', 'INFO'"),
+        ("[run]\nthreads = 0\n[nodes.camera]", r"\[run\] threads: Input should be greater than or equal to 1"),
+        ('[run]\nout_dir = ""\n[nodes.camera]', r"\[run\] out_dir: String should have at least 1 character"),
+        ("[run]\nquestion_timeout_s = 0.0\n[nodes.camera]", r"\[run\] question_timeout_s: Input should be greater"),
+        ("[run]\nquestion_timeout_s = nan\n[nodes.camera]", r"\[run\] question_timeout_s: Input should be a finite"),
+        ("[run]\nquestion_timeout_s = 1e12\n[nodes.camera]", r"\[run\] question_timeout_s: Input should be less"),
+        ('[bus]\nprefix = "a//b"\n[nodes.camera]', r"\[bus\] prefix: String should match pattern"),
+        ('[bus]\nprefix = "a/*"\n[nodes.camera]', r"\[bus\] prefix: String should match pattern"),
     ],
 )
 def test_bad_files_name_the_key(tmp_path: Path, text: str, problem: str) -> None:

@@ -31,7 +31,7 @@ def test_each_asker_gets_its_own_answer_once(forwarded: list) -> None:
     for asker in askers:
         counter.take(asker)  # type: ignore[arg-type]
     (first, question), (second, _) = forwarded
-    assert question.question_id == "same"
+    assert question.question_id == "same" and counter.is_waiting(first)
     counter.answer(second, b'{"n": 2}')
     counter.answer(first, b'{"n": 1}')
     counter.answer(first, b'{"n": 3}')
@@ -58,6 +58,13 @@ def test_too_many_are_told_so_and_a_place_gets_free_again(forwarded: list) -> No
     assert late.replies[0]["error"] == "the grounding node ended"
 
 
+def test_whoever_comes_after_the_end_is_told_so(forwarded: list) -> None:
+    counter, asker = desk(forwarded), Asker()
+    counter.close("the grounding node ended")
+    counter.take(asker)  # type: ignore[arg-type]
+    assert [reply["error"] for reply in asker.replies] == ["the grounding node ended"] and forwarded == []
+
+
 def test_a_slow_node_is_answered_for(forwarded: list) -> None:
     counter, asker = desk(forwarded, timeout_s=0.05), Asker()
     counter.take(asker)  # type: ignore[arg-type]
@@ -65,5 +72,6 @@ def test_a_slow_node_is_answered_for(forwarded: list) -> None:
     while not asker.replies and time.monotonic() < deadline:
         time.sleep(0.01)
     assert asker.replies[0]["error"] == "no answer within 0.05 s"
+    assert not counter.is_waiting(forwarded[0][0])
     counter.answer(forwarded[0][0], b"{}")
     assert len(asker.replies) == 1

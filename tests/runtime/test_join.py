@@ -40,3 +40,12 @@ def test_what_was_lost_is_forgotten_when_a_later_frame_completes() -> None:
     join.add(tags(1))
     assert join.add(last(1)) is not None
     assert len(join) == 0
+
+
+def test_old_incomplete_sets_can_be_forgotten() -> None:
+    join = Join(Tags, LastKeyframe)
+    for i in range(3):
+        join.add(LastKeyframe(frame_id=i, stamp_ns=10 * i, keyframes=0))
+    join.forget_before(10)
+    assert len(join) == 2
+    assert join.add(tags(0)) is None and join.add(tags(1)) is not None

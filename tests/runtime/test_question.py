@@ -13,6 +13,12 @@ def test_only_text_is_needed() -> None:
     assert np.isnan(question.viewpoint_world).all()
 
 
+@pytest.mark.parametrize("mode", ["program", "model"])
+def test_modes(mode: str) -> None:
+    assert parse_request(json.dumps({"text": "cup", "mode": mode}).encode()).mode == mode
+    assert parse_request(b'{"text": "cup"}').mode == "program"
+
+
 def test_all_fields() -> None:
     request = {"text": "cup", "id": "mine", "k": 2, "mode": "program", "viewpoint": [1, 2.5, 0]}
     question = parse_request(json.dumps(request).encode())
@@ -40,6 +46,12 @@ def test_all_fields() -> None:
         (b'{"text": "cup", "viewpoint": [1, 2]}', "viewpoint"),
         (b'{"text": "cup", "viewpoint": [1, 2, NaN]}', "viewpoint"),
         (b'{"text": "cup", "viewpoint": "here"}', "viewpoint"),
+        (b'{"text": "cup", "viewpoint": [1, 2, -1e7]}', "viewpoint"),
+        (b'{"text": "cup", "viewpoint": [1, 2, 1' + b"0" * 400 + b"]}", "viewpoint"),
+        (b'{"text": "cup", "viewpoint": [1, 2, 1e999]}', "viewpoint"),
+        (b'{"text": "cup", "k": 1' + b"0" * 5000 + b"}", "not JSON"),
+        (b'{"text": "\\ud800"}', "text: half of a surrogate"),
+        (b'{"text": "cup", "id": "a\\udfff"}', "id: half of a surrogate"),
     ],
 )
 def test_bad_requests_name_what_is_wrong(payload: bytes, problem: str) -> None:

@@ -78,6 +78,11 @@ def triggers() -> dict[tuple[str, ...], str]:
     }
 
 
+def is_rank(relation: str) -> bool:
+    """Whether a relation orders the targets (largest, leftmost, closest), so that an ordinal counts."""
+    return families()[relation].anchors[relation][0] == 0 and not relation.startswith(("in the", "against"))
+
+
 def label(node: Node) -> str:
     """A node in a sentence: `chair O3`."""
     return f"{node.name} {node.id}"

@@ -28,7 +28,8 @@ def _on(target: Node, anchor: Node) -> Verdict:
     smaller = np.prod(np.ptp(target.box, axis=0)[:2]) <= 1.5 * np.prod(np.ptp(anchor.box, axis=0)[:2])
     holds = bool((abs(gap) <= CONTACT_M or sunk) and over >= LEAST_OVERLAP and smaller)
     score = over * float(np.exp(-abs(gap) / (CONTACT_M if gap > 0 else 1.0)))
-    text = f"the bottom of {label(target)} is {gap:+.2f} m from the top of {label(anchor)}, {over:.0%} of it over it"
+    height_words = f"{abs(gap):.2f} m {'above' if gap > 0 else 'below'}" if abs(gap) >= 0.005 else "level with"
+    text = f"the bottom of {label(target)} is {height_words} the top of {label(anchor)}, {over:.0%} of it over it"
     return Verdict(score if holds else 0.0, holds, text, (anchor.id,))
 
 

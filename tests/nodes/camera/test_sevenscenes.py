@@ -142,3 +142,20 @@ def test_real_frames():
     assert first.color.shape == (480, 640, 3)
     assert 1000 < np.median(first.depth[first.depth > 0]) < 4000
     assert len(source.given_poses() or {}) == 500
+
+
+@pytest.mark.parametrize("kind", [".png", ".jpg"])
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.99])
+def test_an_image_cut_anywhere_is_refused_in_silence(tmp_path, capfd, kind: str, share: float) -> None:
+    from placegraph.nodes.camera._folder import read_color
+    from placegraph.runtime.errors import SourceError
+
+    noise = np.random.default_rng(0).integers(0, 255, (60, 80, 3), np.uint8)
+    data = cv2.imencode(kind, noise)[1].tobytes()
+    path = tmp_path / f"cut{kind}"
+    path.write_bytes(data[: int(len(data) * share)])
+    with pytest.raises(SourceError, match="truncated or damaged"):
+        read_color(path)
+    assert capfd.readouterr() == ("", "")
+    path.write_bytes(data)
+    assert read_color(path).shape == noise.shape

@@ -34,7 +34,8 @@ def test_what_is_no_question_gets_a_reason(node, ask, text, reason):
 
 @pytest.mark.parametrize(
     ("kwargs", "reason"),
-    [({"mode": "poem"}, "mode 'poem'"), ({"k": 0}, "k = 0"), ({"viewpoint": (np.nan, 1, 1)}, "viewpoint"),
+    [({"mode": "poem"}, "mode 'poem'"), ({"mode": "model"}, "needs the language model"),
+     ({"k": 0}, "k = 0"), ({"viewpoint": (np.nan, 1, 1)}, "viewpoint"),
      ({"viewpoint": (np.inf, 1, 1)}, "viewpoint")],
 )  # fmt: skip
 def test_unusable_settings_of_a_question(node, ask, kwargs, reason):

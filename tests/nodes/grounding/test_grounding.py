@@ -111,3 +111,15 @@ def test_a_tie_with_words_left_is_put_to_the_model(node, ask, graph_message, hou
     answer = ask(node, "I met a unicorn and want the nightstand")
     assert answer["object_id"] in ("O16", "O17")
     assert (answer["llm_calls"], answer["sure"]) == (1, False)
+
+
+def test_the_model_reads_and_chooses_whatever_was_asked_before(node, ask, graph_message, house):
+    node.step(graph_message(house))
+    first, second = "find the lamp", "a nightstand"
+    answers = [ask(node, text, mode="model") for text in (first, second, first)]
+    assert answers[0] == answers[2]
+    for answer in answers:
+        assert answer["status"] in ("found", "not_in_map")
+        assert answer["evidence"][0] == "the language model read the question"
+        chosen = any(line.startswith("the language model chose") for line in answer["evidence"])
+        assert answer["llm_calls"] == 1 + chosen

@@ -1,7 +1,10 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.llm import LanguageModel, default_model_path, prompt
+from placegraph.nodes.grounding.llm import MOST_OPENINGS, LanguageModel, default_model_path, prompt
 from placegraph.nodes.grounding.program import enum_rule
 from placegraph.runtime.errors import QueryError
 
@@ -46,3 +49,55 @@ def test_log_probabilities(model):
     again = model.log_probabilities("A bed is found in the bedroom. A", " pillow is found in the", options[::-1])
     np.testing.assert_array_equal(values, again[::-1])
     assert model.log_probabilities("A", " b", []).shape == (0,)
+
+
+OPENING, TEXT, OPTIONS = "A bed is found in the bedroom. A", " pillow is found in the", (" bedroom", " dining room")
+
+
+def probabilities(model):
+    return model.log_probabilities(OPENING, TEXT, OPTIONS).tobytes()
+
+
+def decoded(model, opening="Say O2 or O1."):
+    """A reply and every bit of what the model would say next."""
+    reply = model.complete(" Say:", 'root ::= " " ("O1" | "O2")', 8, opening=opening)
+    return reply, model._next_log_probabilities().tobytes()
+
+
+def test_replies_do_not_depend_on_what_was_asked_before(model):
+    first = probabilities(model), decoded(model), decoded(model, "")
+    model.complete("word " * 200, "root ::= " + enum_rule(["O1"]), 8)
+    assert (decoded(model), decoded(model, ""), probabilities(model)) == (first[1], first[2], first[0])
+    model.log_probabilities("Another opening of other words", TEXT, OPTIONS[::-1])
+    assert decoded(model, "") == first[2]
+    assert [probabilities(model), probabilities(model)] == [first[0]] * 2
+    assert [decoded(model), decoded(model)] == [first[1]] * 2
+
+
+def test_replies_are_the_same_in_a_new_process(model):
+    code = (
+        "from placegraph.nodes.grounding.llm import LanguageModel;"
+        f"print(LanguageModel(n_ctx=256).log_probabilities({OPENING!r}, {TEXT!r}, {OPTIONS!r}).tobytes().hex())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert bytes.fromhex(done.stdout.strip()) == probabilities(model)
+
+
+def test_what_fits(model):
+    assert model.fits("word " * 100, "word " * 100, 8)
+    assert not model.fits("word " * 100, "word " * 100, 100)
+    assert not model.fits("word " * 150, "word " * 150, 8)
+
+
+def test_marks_in_a_text_after_an_opening_are_only_words(model):
+    model.load()
+    assert len(model._tokens("<|im_end|>", 1)) == 1
+    assert len(model._tokens("<|im_end|>", 1, before="a")) > 1
+
+
+def test_the_openings_kept_are_bounded(model):
+    first = decoded(model)
+    for number in range(MOST_OPENINGS + 2):
+        decoded(model, f"Opening {number}.")
+        assert len(model._openings) <= MOST_OPENINGS
+    assert decoded(model) == first

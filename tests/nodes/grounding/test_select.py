@@ -42,3 +42,12 @@ def test_an_unknown_place_is_said_and_leaves_doubt(names, house):
     assert not scope.sure
     assert len(scope.objects) == 25
     assert "stable" in scope.notes[0]
+
+
+def test_a_floor_that_is_not_there_is_said_in_words(names, house, node_of):
+    building, floor = node_of("B0", "", "building", (0, 0, 0), (1, 1, 1)), node_of("F0", "B0", "", (0, 0, 0), (1, 1, 1))
+    looked = [
+        narrow(graph, Program(target=Thing(), floor="third floor"), names).notes[0].split("; ")[1]
+        for graph in (SceneGraph.of([building]), SceneGraph.of([building, floor]), house)
+    ]
+    assert looked == ["looked everywhere", "looked on its only floor", "looked on all 2 floors"]

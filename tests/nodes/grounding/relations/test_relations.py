@@ -131,3 +131,12 @@ def test_in_the_room(cube):
     assert [v.holds for v in judge("in the middle", nodes, room=room)] == [False, True, False]
     assert [v.holds for v in judge("against the wall", nodes, room=room)] == [True, False, True]
     assert [v.holds for v in judge("in the corner", nodes)] == [False] * 3
+
+
+@pytest.mark.parametrize(
+    ("height", "words"),
+    [(0.4, "level with the top"), (0.45, "0.05 m above the top"), (0.3, "0.10 m below the top")],
+)
+def test_what_lies_on_something_is_told_from_its_top(cube, height, words):
+    (verdict,) = judge("on", [cube(1, (0, 0, height))], [(cube(0, (0, 0, 0)),)])
+    assert verdict.sentence.startswith(f"the bottom of cube O1 is {words} of cube O0")

@@ -1,0 +1,68 @@
+"""Every node gives today what it gave when house.rec was made. `placegraph references --update` remakes it."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from placegraph.runtime.node import NODES, available
+from placegraph.tools.graph import node_types
+from placegraph.tools.recorded_steps import Reference, differences, summary
+from placegraph.tools.references import LEFT_OUT, RECORDING, SUMMARY
+
+HERE = Path(__file__).parent
+TAKERS = sorted(name for name, kind in node_types().items() if kind.takes)
+# One setting of each node that must show in what it gives: proof that the comparison can fail.
+CHANGED: dict[str, dict[str, Any]] = {
+    "pose": {"voxel_m": 0.11},
+    "keyframe": {"translation_m": 0.16, "rotation_rad": 0.16},
+    "instances": {"max_objects": 1},
+    "tagger": {"max_objects": 1},
+    "detector": {"max_objects": 1},
+    "segmenter": {"max_objects": 1},
+    "fusion": {"edge_ratio": 0.06},
+    "hierarchy": {"floors": {"bin_m": 0.02}},
+    "grounding": {"use_model": False},
+}
+
+
+@pytest.fixture(scope="module")
+def reference() -> Reference:
+    return Reference.read(HERE / RECORDING)
+
+
+def test_every_node_that_takes_something_has_a_reference_or_a_reason(reference: Reference) -> None:
+    assert set(reference.steps) | set(LEFT_OUT) == set(TAKERS)
+    assert not set(reference.steps) & set(LEFT_OUT)
+    assert set(TAKERS) <= set(available(NODES))
+    assert all(LEFT_OUT.values())
+
+
+@pytest.mark.parametrize("name", [name for name in TAKERS if name not in LEFT_OUT])
+def test_a_fresh_node_gives_what_it_gave(reference: Reference, name: str) -> None:
+    assert any(given for _, given in reference.steps[name])
+    found = differences(reference, name)
+    assert found == [], "\n".join(["", *found, "meant? placegraph references --update, and say why in the commit"])
+
+
+@pytest.mark.parametrize("name", [name for name in TAKERS if name not in LEFT_OUT])
+def test_a_changed_setting_is_noticed(reference: Reference, name: str) -> None:
+    assert differences(reference, name, **CHANGED[name]) != []
+
+
+def test_each_kind_that_a_node_gives_is_in_its_reference(reference: Reference) -> None:
+    for name, steps in reference.steps.items():
+        given = {type(reference.messages[i]) for _, numbers in steps for i in numbers}
+        assert given == set(node_types()[name].gives), name
+
+
+def test_the_language_model_is_asked_in_both_ways(reference: Reference) -> None:
+    assert {key.split('"')[1] for key in reference.replies} == {"complete", "log_probabilities"}
+
+
+def test_the_summary_is_that_of_the_recording(reference: Reference) -> None:
+    assert (HERE / SUMMARY).read_text(encoding="utf-8") == summary(reference)
+
+
+def test_the_folder_stays_small() -> None:
+    assert sum(path.stat().st_size for path in HERE.iterdir() if path.is_file()) < 2_000_000

@@ -1,0 +1,83 @@
+from pathlib import Path
+
+import pytest
+
+from placegraph.runtime.bus import BusConfig
+from placegraph.runtime.codec import encode
+from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.flow import Parcel
+from placegraph.runtime.messages import Answer, Graph, LastKeyframe, Message, Question
+from placegraph.runtime.node import Context, Node, build_node
+from placegraph.runtime.process import Process, ProcessSpec
+from placegraph.tools.replay import replay_crash
+
+
+def process(node: str | Node, folder: Path) -> Process:
+    name = node if isinstance(node, str) else "grounding"
+    context = Context(out_dir=str(folder))
+    spec = ProcessSpec(node=name, settings={}, context=context, bus=BusConfig(), takers={}, question_timeout_s=0.05)
+    shell = Process(spec, build_node(name, {}, context) if isinstance(node, str) else node)
+    shell._receipt = lambda payload, attachment: None
+    return shell
+
+
+def last_keyframe() -> LastKeyframe:
+    return LastKeyframe(frame_id=-1, stamp_ns=0, keyframes=0)
+
+
+def fail(shell: Process) -> None:
+    shell._puts = dict.fromkeys(shell.node.gives, lambda payload, attachment: None)
+    for number in (1, 2):  # the second one is one too many
+        shell._take(Parcel(LastKeyframe, number, encode(last_keyframe())))
+
+
+def test_a_step_that_fails_leaves_a_crash_file_that_fails_again(tmp_path: Path, capsys) -> None:
+    with pytest.raises(SchemaError, match="after the last keyframe"):
+        fail(process("fusion", tmp_path))
+    with pytest.raises(SchemaError, match="after the last keyframe"):
+        replay_crash(tmp_path / "crash" / "fusion.rec")
+    assert "gives Map of frame -1" in capsys.readouterr().out
+
+
+def test_a_crash_file_that_cannot_be_written_does_not_hide_the_error(tmp_path: Path, caplog) -> None:
+    (tmp_path / "crash").write_text("a file where the folder should be")
+    with pytest.raises(SchemaError, match="after the last keyframe"):
+        fail(process("fusion", tmp_path))
+    assert "no whole crash file" in caplog.text
+
+
+class SlowAnswers(Node):
+    """Answers nothing in time."""
+
+    takes, gives, serves = (Graph, Question), (Answer,), (Question, Answer)
+    stepped: int = 0
+
+    def step(self, message: Message) -> list[Message]:
+        self.stepped += 1
+        return []
+
+
+class Asker:
+    """Stands where the bus's Request stands."""
+
+    payload = b'{"text": "cup"}'
+    replied = False
+
+    def reply(self, payload: bytes) -> None:
+        self.replied = True
+
+
+@pytest.mark.parametrize("in_time", [True, False])
+def test_a_question_that_nobody_waits_for_any_more_is_not_stepped(tmp_path: Path, in_time: bool) -> None:
+    node, asker = SlowAnswers(None, Context()), Asker()
+    shell = process(node, tmp_path)
+    shell._puts = {Question: lambda payload, attachment: None}
+    shell._desk.take(asker)  # type: ignore[arg-type]
+    parcel = shell.inbox.get(1.0)
+    assert parcel is not None
+    if not in_time:
+        shell._desk._waiting[parcel.sequence][1].join()
+        assert asker.replied
+    shell._take(parcel)
+    assert node.stepped == int(in_time)
+    shell.end()

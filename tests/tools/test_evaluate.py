@@ -1,0 +1,131 @@
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from placegraph.nodes.camera import detect
+from placegraph.runtime.messages import Pose
+from placegraph.tools.evaluate import absolute_trajectory_error, against_given
+from placegraph.tools.map_folder import write_trajectory
+
+SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+
+
+def poses(positions):
+    found = {}
+    for stamp, position in enumerate(positions):
+        found[stamp] = np.eye(4)
+        found[stamp][:3, 3] = position
+    return found
+
+
+def positions(values):
+    return dict(enumerate(np.asarray(values, float)))
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_too_few_pairs(count) -> None:
+    with pytest.raises(ValueError, match=f"at least 3 pairs are needed, got {count}"):
+        absolute_trajectory_error(SQUARE[:count], SQUARE[:count])
+    assert against_given(positions(SQUARE[:count]), poses(SQUARE)) is None
+
+
+def test_a_rigidly_moved_copy_has_no_error() -> None:
+    walk = np.random.default_rng(0).normal(size=(50, 3))
+    turn = Rotation.from_euler("xyz", (0.3, -2.0, 1.1)).as_matrix()
+    assert absolute_trajectory_error(walk @ turn.T + (5.0, -3.0, 1.0), walk) == pytest.approx((0, 0), abs=1e-12)
+
+
+def test_a_known_error() -> None:
+    # Two opposite corners up, two down by 0.1: no rigid motion can undo that, so every point is off by 0.1.
+    bent = SQUARE + np.array([[0, 0, 0.1], [0, 0, -0.1], [0, 0, 0.1], [0, 0, -0.1]])
+    assert absolute_trajectory_error(bent, SQUARE) == pytest.approx((0.1, 0.1))
+
+
+def test_one_shifted_point_of_a_symmetric_line() -> None:
+    # The middle of a line along x moved by 0.3 along y: the best fit shifts by the mean, 0.1, and does not turn.
+    line = np.array([[-1.0, 0, 0], [0, 0, 0], [1, 0, 0]])
+    rmse, worst = absolute_trajectory_error(line + np.array([[0, 0, 0], [0, 0.3, 0], [0, 0, 0]]), line)
+    assert rmse == pytest.approx(math.sqrt((0.1**2 + 0.2**2 + 0.1**2) / 3))
+    assert worst == pytest.approx(0.2)
+
+
+def test_scale_is_not_forgiven_and_a_mirrored_track_is_no_copy() -> None:
+    rmse, worst = absolute_trajectory_error(SQUARE * 1.5, SQUARE)
+    assert rmse == pytest.approx(0.5 * math.sqrt(2)) and worst == pytest.approx(rmse)
+    solid = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    assert absolute_trajectory_error(solid * [1, 1, -1], solid)[0] > 0.1
+
+
+def test_pairs_are_those_with_equal_stamps_and_finite_poses() -> None:
+    given = poses(SQUARE)
+    given[1] = np.full((4, 4), np.nan)
+    estimated = positions(SQUARE) | {77: np.array([9.0, 9, 9])}
+    found = against_given(estimated, given)
+    assert found == {"ate_rmse_m": 0.0, "ate_max_m": 0.0, "poses": 3, "path_m": round(2 * math.sqrt(2) + 2, 2)}
+    assert against_given(estimated, None) is None and against_given(estimated, {}) is None
+
+
+@pytest.fixture
+def track(tmp_path, seven):
+    """A map folder whose trajectory is the given one of `seven`, moved and turned, with the last point 0.3 m off."""
+    given = detect(str(seven))(seven, {}).given_poses()
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_euler("z", 0.7).as_matrix()
+    motion[:3, 3] = (4, 5, 6)
+
+    def write(error_m=0.0):
+        found = []
+        for frame_id, (stamp_ns, pose) in enumerate(sorted(given.items())):
+            moved = motion @ pose
+            moved[2, 3] += error_m if frame_id == 3 else 0.0
+            found.append(
+                Pose(
+                    frame_id=frame_id,
+                    stamp_ns=stamp_ns,
+                    world_from_camera=moved,
+                    trusted=True,
+                    quality=1.0,
+                    residual_m=0.0,
+                    innovation_m=0.0,
+                    reason="",
+                )
+            )
+        folder = tmp_path / "map"
+        folder.mkdir()
+        write_trajectory(folder / "trajectory.txt", found)
+        return folder
+
+    return write
+
+
+def test_the_command_on_a_moved_copy(cli, track, seven) -> None:
+    done = cli("evaluate", track(), "--source", seven, "--json")
+    assert done.code == 0 and done.err == ""
+    found = json.loads(done.out)
+    assert set(found) == {"ate_rmse_m", "ate_max_m", "poses", "path_m"}
+    assert (found["ate_rmse_m"], found["ate_max_m"], found["poses"]) == (0.0, 0.0, 4) and found["path_m"] > 1
+
+
+def test_the_command_in_words(cli, track, seven) -> None:
+    done = cli("evaluate", track(0.3), "--source", seven)
+    assert done.out.startswith("ATE rmse 0.") and done.out.endswith(" m of path\n") and "rmse 0.0 m" not in done.out
+
+
+def test_errors_name_the_file(cli, track, seven, tmp_path) -> None:
+    folder = track()
+    absent = cli("evaluate", tmp_path / "no", "--source", seven)
+    assert (absent.code, absent.reason) == (
+        1,
+        f"{tmp_path / 'no' / 'trajectory.txt'}: cannot read: No such file or directory",
+    )
+    source = cli("evaluate", folder, "--source", tmp_path / "no")
+    assert (source.code, source.reason) == (1, f"{tmp_path / 'no'}: no such file or folder")
+    (folder / "trajectory.txt").write_text("# nothing\n")
+    assert "fewer than 3 given poses at the times of" in cli("evaluate", folder, "--source", seven).reason
+    (folder / "trajectory.txt").write_text("# two\n0.0 1 2 3\n")
+    assert (
+        cli("evaluate", folder, "--source", seven).reason == f"{folder / 'trajectory.txt'}:2: expected 8 finite numbers"
+    )
