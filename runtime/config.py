@@ -73,7 +73,8 @@ def packaged_names() -> list[str]:
 
 
 def _first_problem(error: ValidationError) -> str:
-    first = error.errors()[0]
+    problems = error.errors()  # an unknown section first: a misspelt one is also said to be missing
+    first = next((one for one in problems if one["type"] == "extra_forbidden"), problems[0])
     section, *keys = [str(part) for part in first["loc"]]
     return f"[{section}]{' ' if keys else ''}{'.'.join(keys)}: {first['msg']}"
 

@@ -191,14 +191,18 @@ class Launcher:
         status = self._processes[name].poll()
         if status is not None:
             how = f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
-            raise PlacegraphError(f"{name} {how}{self._log_tail(name)}")
+            errors = [line for line in self._log_lines(name) if f" ERROR {name} " in line]
+            cause = errors[-1].partition(f" ERROR {name} ")[2] if errors else ""
+            raise PlacegraphError(f"{name} {how}{': ' if cause else ''}{cause}{self._log_tail(name)}")
 
     def _log_path(self, name: str) -> Path:
         return self._out_dir / "log" / f"{name}.log"
 
+    def _log_lines(self, name: str) -> list[str]:
+        return self._log_path(name).read_text(errors="replace").splitlines()[-LOG_TAIL_LINES:]
+
     def _log_tail(self, name: str) -> str:
-        lines = self._log_path(name).read_text(errors="replace").splitlines()[-LOG_TAIL_LINES:]
-        return "".join(f"\n    {line}" for line in lines) + f"\n    (all of it: {self._log_path(name)})"
+        return "".join(f"\n    {line}" for line in self._log_lines(name)) + f"\n    (all of it: {self._log_path(name)})"
 
     @staticmethod
     def _wait(process: subprocess.Popen[bytes], timeout_s: float) -> bool:

@@ -260,7 +260,7 @@ class Question(Message):
     question_id: str
     text: str
     k: int  # how many candidates to list
-    mode: str  # "program"
+    mode: str  # one of question.MODES
     viewpoint_world: F64 = array("float64", (3,), unit="m", frame="world")  # the asker's position; NaN: not given
 
 

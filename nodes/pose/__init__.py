@@ -50,7 +50,9 @@ class PoseNode(Node):
         points = backproject(depth_m, message.intrinsics, self.config.stride)
         ranges = np.linalg.norm(points, axis=1)
         points = points[(ranges > self.config.min_range_m) & (ranges < self.config.max_range_m)]
-        estimate = self._given(message) if self.config.method == "given" else self._odometry.register(points)
+        estimate = (
+            self._given(message) if self.config.method == "given" else self._odometry.register(points, message.stamp_ns)
+        )
         pose = Pose(frame_id=message.frame_id, stamp_ns=message.stamp_ns, **estimate)
         if self._world_from_start is not None:
             return [self._in_world(pose)]

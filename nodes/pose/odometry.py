@@ -13,11 +13,15 @@ from kiss_icp.kiss_icp import KissICP
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
 
 from placegraph.runtime.geometry import transform
 from placegraph.runtime.node import NodeConfig
 
 F64 = NDArray[np.float64]
+
+SAME_SPAN = 0.05  # stamps of an even rate differ by rounding
+LONGEST_STRETCH = 3.0  # nobody keeps a motion up for longer
 
 
 class OdometryConfig(NodeConfig):
@@ -31,6 +35,7 @@ class OdometryConfig(NodeConfig):
     min_motion_m: float = 0.02
     min_points: int = 200  # fewer: a covered lens, a white wall too near
     min_quality: float = 0.25  # share of the scan that must lie on the map; a step through a doorway leaves a third
+    relock_quality: float = 0.7  # share needed to go on after a lost track: a wrong place fits halfway, too
     max_innovation_m: float = 0.3  # a hand-held camera does not depart further from constant motion in one frame
     seed: int = 0
 
@@ -39,24 +44,29 @@ class Odometry:
     """KISS-ICP against its local map; what does not fit is reported and left out of it."""
 
     TREE_PERIOD = 10  # frames between rebuilds of the search tree that judges the fit
+    FRESH_TREE_BELOW = 0.8  # a worse fit is judged again with a tree of the whole map
     JUDGED_POINTS = 1000
 
     def __init__(self, config: OdometryConfig, threads: int) -> None:
         self._config = config
         self._kiss = KissICP(_kiss_config(config, threads))
         self._tree: KDTree | None = None
-        self._frames = 0
+        self._tree_age = 0  # frames put into the map since the tree was grown
+        self._is_lost = False
+        self._stamp_ns: int | None = None
+        self._span_ns = 0  # between the two frames that `last_delta` lies between
         self._random = np.random.default_rng(config.seed)
 
-    def register(self, points: NDArray[np.float32]) -> dict[str, Any]:
+    def register(self, points: NDArray[np.float32], stamp_ns: int) -> dict[str, Any]:
         """Fields of the Pose for one scan, (N, 3) metres, camera frame; the start frame is the first camera."""
+        span_ns, self._stamp_ns = stamp_ns - (self._stamp_ns or stamp_ns), stamp_ns
         if len(points) < self._config.min_points:
             return self._lost(f"{len(points)} points, {self._config.min_points} needed")
         kiss = self._kiss
         scan = kiss.preprocessor.preprocess(points.astype(np.float64), np.zeros(len(points)), kiss.last_delta)
         source, downsampled = kiss.voxelize(scan)
         sigma = kiss.adaptive_threshold.get_threshold()
-        guess = kiss.last_pose @ kiss.last_delta
+        guess = kiss.last_pose @ _stretched(kiss.last_delta, span_ns, self._span_ns)
         pose = kiss.registration.align_points_to_map(
             points=source,
             voxel_map=kiss.local_map,
@@ -66,10 +76,14 @@ class Odometry:
         )
         innovation = np.linalg.inv(guess) @ pose
         innovation_m = float(np.linalg.norm(innovation[:3, 3]))
-        quality, residual_m = self._fit(transform(pose, np.asarray(source)))
+        in_start = transform(pose, np.asarray(source))
+        quality, residual_m = self._fit(in_start)
+        if quality < self.FRESH_TREE_BELOW and self._tree_age:
+            self._grow_tree()
+            quality, residual_m = self._fit(in_start)
         measured = {"quality": quality, "residual_m": residual_m, "innovation_m": innovation_m}
         if self._tree is not None:
-            if quality < self._config.min_quality:
+            if quality < (self._config.relock_quality if self._is_lost else self._config.min_quality):
                 return self._lost(f"only {quality:.0%} of the scan lies on the map", measured)
             if innovation_m > self._config.max_innovation_m:
                 return self._lost(f"jumped {innovation_m:.2f} m in one frame", measured)
@@ -77,10 +91,15 @@ class Odometry:
         kiss.local_map.update(downsampled, pose)
         kiss.last_delta = np.linalg.inv(kiss.last_pose) @ pose
         kiss.last_pose = pose
-        if self._tree is None or self._frames % self.TREE_PERIOD == 0:
-            self._tree = KDTree(kiss.local_map.point_cloud())
-        self._frames += 1
+        self._span_ns = span_ns
+        self._tree_age += 1
+        if self._tree is None or self._tree_age >= self.TREE_PERIOD:
+            self._grow_tree()
+        self._is_lost = False
         return {"world_from_camera": pose, "trusted": True, "reason": "", **measured}
+
+    def _grow_tree(self) -> None:
+        self._tree, self._tree_age = KDTree(self._kiss.local_map.point_cloud()), 0
 
     def _fit(self, xyz: F64) -> tuple[float, float]:
         """Share of points with a map point within 1.5 voxels, and the median distance of those (metres)."""
@@ -95,6 +114,7 @@ class Odometry:
     def _lost(self, reason: str, measured: dict[str, float] | None = None) -> dict[str, Any]:
         """Stay at the last trusted pose and try again from there with the next frame."""
         self._kiss.last_delta = np.eye(4)
+        self._is_lost = True
         nothing = {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}
         return {
             "world_from_camera": self._kiss.last_pose,
@@ -114,3 +134,14 @@ def _kiss_config(config: OdometryConfig, threads: int) -> KISSConfig:
     kiss.adaptive_threshold.initial_threshold = config.initial_threshold_m
     kiss.adaptive_threshold.min_motion_th = config.min_motion_m
     return kiss
+
+
+def _stretched(delta: F64, span_ns: int, old_span_ns: int) -> F64:
+    """The motion (4, 4) of `old_span_ns` continued for `span_ns`: live, frames are dropped and the spans differ."""
+    if span_ns <= 0 or old_span_ns <= 0 or abs(span_ns / old_span_ns - 1) < SAME_SPAN:
+        return delta
+    ratio = min(span_ns / old_span_ns, LONGEST_STRETCH)
+    stretched = np.eye(4)
+    stretched[:3, :3] = Rotation.from_rotvec(Rotation.from_matrix(delta[:3, :3]).as_rotvec() * ratio).as_matrix()
+    stretched[:3, 3] = delta[:3, 3] * ratio
+    return stretched

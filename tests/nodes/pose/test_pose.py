@@ -10,7 +10,7 @@ UP = np.array([0.0, -1.0, 0.0])
 
 
 def room_depth(x: float) -> np.ndarray:
-    """Depth (120, 160) in metres of a 2 m wide corridor with a box in it, from a level camera x metres off its middle."""
+    """Depth (120, 160) in metres of a 2 m wide corridor with a box, from a level camera x metres off its middle."""
     v, u = np.mgrid[0:120, 0:160]
     rays = np.stack(((u - 80) / 100, (v - 60) / 100, np.ones(u.shape)), -1)
     with np.errstate(divide="ignore"):
