@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 import time
+from typing import TextIO
 
 
 class _Format(logging.Formatter):
@@ -15,8 +16,20 @@ class _Format(logging.Formatter):
         self.converter = time.gmtime
 
 
+class _Stderr(logging.StreamHandler[TextIO]):
+    """Writes to what standard error is at the time of writing: it may have been redirected since."""
+
+    @property
+    def stream(self) -> TextIO:  # type: ignore[override]
+        return sys.stderr
+
+    @stream.setter
+    def stream(self, value: TextIO) -> None:
+        pass
+
+
 def configure(node: str, level: str = "INFO") -> None:
     """Log to stderr with the node's name; calling again replaces what was there."""
-    handler = logging.StreamHandler(sys.stderr)
+    handler = _Stderr()
     handler.setFormatter(_Format(node))
     logging.basicConfig(level=level, handlers=[handler], force=True)

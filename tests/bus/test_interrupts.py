@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -79,7 +80,9 @@ def test_live_it_is_not_waited_for_ever_for_a_keyframe_that_is_lost(
     config = RunConfig(bus=bus_config, nodes=nodes | {"fusion": {}, "hierarchy": {}})
 
     def hold_instances() -> None:
-        wait_until(lambda: "ready" in log(tmp_path, "instances"), "instances is ready")
+        names = ("camera", *nodes, "fusion", "hierarchy")
+        wait_until(lambda: all("ready" in log(tmp_path, name) for name in names), "every node is ready")
+        time.sleep(0.5)  # "ready" is logged before the launcher knows of it; the frames take 2.5 s
         (instances,) = (
             child
             for child in psutil.Process().children()
