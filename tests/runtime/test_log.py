@@ -1,16 +1,6 @@
 import logging
 
-import pytest
-
 from placegraph.runtime import log
-
-
-@pytest.fixture(autouse=True)
-def handlers_as_before():
-    root = logging.getLogger()
-    before, level = root.handlers[:], root.level
-    yield
-    root.handlers[:], root.level = before, level
 
 
 def test_level_node_and_text_go_to_standard_error_of_the_moment(capsys) -> None:

@@ -52,7 +52,7 @@ def test_each_node_is_kept_with_its_settings_and_steps(small: Path) -> None:
 def test_nothing_differs_from_what_was_just_made(small: Path) -> None:
     result = CliRunner().invoke(APP, ["--folder", str(small)])
     assert result.exit_code == 0
-    assert [line.split()[0] for line in result.output.splitlines()] == [*tool.IN_WALK, *tool.IN_HOUSE, *tool.THREE]
+    assert [line.split()[0] for line in result.stdout.splitlines()] == [*tool.IN_WALK, *tool.IN_HOUSE, *tool.THREE]
     assert result.output.count("as recorded") == 9
 
 
