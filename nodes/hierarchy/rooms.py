@@ -41,7 +41,7 @@ class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     neck_share: float = 0.7  # departs: ... if they are this much narrower than the smaller room
     close_m: float = 0.3  # gaps in what was observed that are closed
     room_min_m2: float = 1.0
-    wall_min_m: float = 1.0  # less wall than this in all: nothing parts rooms
+    wall_min_m: float = 1.0  # less wall than this in all parts no rooms; in a plan, shorter pieces are furniture
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +133,18 @@ def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid:
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     padded = cv2.copyMakeBorder(wide, reach, reach, reach, reach, cv2.BORDER_CONSTANT, value=0)
     return cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[reach:-reach, reach:-reach].astype(bool)
+
+
+def walls_of_plan(occupied: Bool, config: RoomConfig) -> Bool:
+    """Walls of a plan without heights: its occupied pieces of `wall_min_m` or more; shorter ones are furniture.
+
+    Source: ours, measured on the ipa maps (README, "Results").
+    """
+    _, pieces, boxes, _ = cv2.connectedComponentsWithStats(occupied.astype(np.uint8), connectivity=8)
+    sides = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+    is_wall = sides * config.cell_m >= config.wall_min_m
+    is_wall[0] = False  # what is not occupied
+    return np.asarray(is_wall[pieces])
 
 
 def segment_rooms(walls: Bool, observed: Bool, config: RoomConfig) -> I32:

@@ -12,6 +12,7 @@ from placegraph.nodes.hierarchy.rooms import (
     observed_mask,
     segment_rooms,
     wall_mask,
+    walls_of_plan,
 )
 
 CONFIG = RoomConfig()
@@ -152,3 +153,13 @@ def test_outline_of_a_rectangle_is_exact():
     outline = Grid(np.array([1.0, 2.0]), 0.1, (20, 30)).outline(mask)
     assert outline.min(axis=0) == pytest.approx((2.0, 2.5), abs=0.06)
     assert outline.max(axis=0) == pytest.approx((3.5, 3.5), abs=0.06)
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_walls_of_a_plan_are_its_long_pieces(count: int) -> None:
+    occupied = np.zeros((60, 60), bool)
+    assert not walls_of_plan(occupied, CONFIG).any()
+    occupied[5, 5 : 5 + 40 * count] = True  # two metres of wall
+    occupied[30:40, 30:40] = True  # half a metre of table
+    walls = walls_of_plan(occupied, CONFIG)
+    assert walls.sum() == 40 * count and not walls[30:40, 30:40].any()
