@@ -115,4 +115,5 @@ def test_readme_names_only_files_and_commands_that_exist() -> None:
 def test_packaged_dataflows_name_known_nodes_and_settings(path: Path) -> None:
     types = node_types()
     for name, settings in read(path).nodes.items():
-        types[name].config_type.model_validate(settings)
+        validated = types[name].config_type.model_validate(settings)
+        assert set(settings) <= set(validated.model_dump())

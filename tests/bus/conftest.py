@@ -1,7 +1,6 @@
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
-import psutil
 import pytest
 
 from placegraph.runtime.bus import BusConfig, free_endpoint
@@ -10,17 +9,6 @@ from placegraph.runtime.bus import BusConfig, free_endpoint
 @pytest.fixture
 def bus_config() -> BusConfig:
     return BusConfig(endpoint=free_endpoint(), prefix="test")
-
-
-@pytest.fixture(autouse=True)
-def no_process_is_left() -> Iterator[None]:
-    before = set(psutil.Process().children(recursive=True))
-    yield
-    left = [process for process in psutil.Process().children(recursive=True) if process not in before]
-    for process in left:
-        process.kill()
-    psutil.wait_procs(left, timeout=5)
-    assert left == []
 
 
 @pytest.fixture

@@ -1,6 +1,3 @@
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -8,15 +5,6 @@ from placegraph.nodes.segmenter import NODE, SegmenterConfig
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Detections, Keyframe
 from placegraph.runtime.node import Context
-
-MAKER = Path(__file__).parents[1] / "models_onnx" / "make_tiny_models.py"
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    path = tmp_path_factory.mktemp("tiny")
-    runpy.run_path(str(MAKER))["write_models"](path)
-    return path
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import contextlib
 import io
 import logging
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -152,16 +152,3 @@ def seven(tmp_path: Path) -> Path:
     fx, fy, cx, cy = source.intrinsics
     np.savetxt(folder / "camera-intrinsics.txt", [[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
     return folder
-
-
-@pytest.fixture
-def no_process_is_left() -> Iterator[None]:
-    import psutil
-
-    before = set(psutil.Process().children(recursive=True))
-    yield
-    left = [process for process in psutil.Process().children(recursive=True) if process not in before]
-    for process in left:
-        process.kill()
-    psutil.wait_procs(left, timeout=5)
-    assert left == []

@@ -6,7 +6,6 @@ from placegraph.runtime.recording import kinds_in
 
 
 @pytest.mark.bus
-@pytest.mark.usefixtures("no_process_is_left")
 def test_a_recording_maps_like_its_source_under_the_same_config(cli, drawn_flow, mapped, tmp_path) -> None:
     done = cli("record", drawn_flow, "--out", tmp_path / "taken", "--quiet")
     assert done.code == 0, done.err

@@ -186,7 +186,6 @@ def test_an_endpoint_that_is_taken(cli, drawn_flow, tmp_path) -> None:
 
 
 @pytest.mark.bus
-@pytest.mark.usefixtures("no_process_is_left")
 def test_the_cause_reaches_the_terminal_from_the_cameras_process(cli, folder_flow, seven, tmp_path) -> None:
     cut(seven / "frame-000002.color.jpg")
     done = cli("run", folder_flow, "--source", seven, "--quiet", "--endpoint", free_endpoint(), "--out", tmp_path / "m")
