@@ -47,6 +47,7 @@ class KeyframeNode(Node):
         self._last: tuple[int, NDArray[np.float64]] | None = None  # stamp and pose of the last keyframe
         self._in_flight: dict[int, int] = {}  # frame id to stamp
         self._chosen = 0
+        self._last_keyframe_id = -1
         self._last_seen = -1
         self._end: End | None = None
 
@@ -101,19 +102,10 @@ class KeyframeNode(Node):
         self._chosen += 1
         self._last_keyframe_id = frame.frame_id
         self._in_flight[frame.frame_id] = frame.stamp_ns
-        return Keyframe(
-            frame_id=frame.frame_id,
-            stamp_ns=frame.stamp_ns,
-            color=frame.color,
-            depth=frame.depth,
-            depth_unit_m=frame.depth_unit_m,
-            intrinsics=frame.intrinsics,
-            world_from_camera=pose.world_from_camera,
-        )
+        return Keyframe.of(frame, pose.world_from_camera)
 
     def _last_message(self, end: End) -> LastKeyframe:
-        last_id = self._last_keyframe_id if self._chosen else -1
-        return LastKeyframe(frame_id=last_id, stamp_ns=end.stamp_ns, keyframes=self._chosen)
+        return LastKeyframe(frame_id=self._last_keyframe_id, stamp_ns=end.stamp_ns, keyframes=self._chosen)
 
 
 NODE = KeyframeNode

@@ -124,16 +124,3 @@ def convex_footprint(xyz: Points) -> F32:
     """Convex outline of (N, 3) points seen from above: (K, 2) metres, counter-clockwise."""
     xy = np.ascontiguousarray(xyz[:, :2], dtype=np.float32)
     return np.asarray(cv2.convexHull(xy, clockwise=False), np.float32).reshape(-1, 2)
-
-
-def points_in_polygon(xy: Points, polygon: Points) -> NDArray[np.bool_]:
-    """Which of (N, 2) points lie inside a simple polygon (K, 2); false everywhere when K < 3 (even-odd rule)."""
-    inside = np.zeros(len(xy), bool)
-    if len(polygon) < 3:
-        return inside
-    x, y = xy[:, 0], xy[:, 1]
-    for (x0, y0), (x1, y1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        crosses = (y0 > y) != (y1 > y)
-        if y1 != y0:
-            inside ^= crosses & (x < (x1 - x0) * (y - y0) / (y1 - y0) + x0)
-    return inside

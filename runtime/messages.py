@@ -149,6 +149,12 @@ class Pose(Message):
 class Keyframe(Message):
     """A frame worth perceiving, with its pose."""
 
+    @classmethod
+    def of(cls, frame: Frame, world_from_camera: F64) -> Keyframe:
+        """A frame with the (4, 4) pose it was taken from, metres."""
+        shared = ("frame_id", "stamp_ns", "color", "depth", "depth_unit_m", "intrinsics")
+        return cls(**{name: getattr(frame, name) for name in shared}, world_from_camera=world_from_camera)
+
     color: U8 = array("uint8", ("H", "W", 3), unit="sRGB")
     depth: U16 = array("uint16", ("H", "W"), unit="depth_unit_m", frame="camera")
     depth_unit_m: float

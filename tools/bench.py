@@ -71,18 +71,7 @@ def _timed_ms(action: Callable[[], T], clock: Clock = CPU) -> tuple[float, T]:
 def drawn_keyframes(count: int, width: int, height: int) -> list[Keyframe]:
     """Keyframes evenly along the drawn scene's walk, at their true poses; one keyframe: the walk's start."""
     source = Synthetic(Path(), {"width": width, "height": height, "frames": max(count, 2)})
-    return [
-        Keyframe(
-            frame_id=frame.frame_id,
-            stamp_ns=frame.stamp_ns,
-            color=frame.color,
-            depth=frame.depth,
-            depth_unit_m=frame.depth_unit_m,
-            intrinsics=frame.intrinsics,
-            world_from_camera=frame.given_world_from_camera,
-        )
-        for frame in islice(source.frames(), count)
-    ]
+    return [Keyframe.of(frame, frame.given_world_from_camera) for frame in islice(source.frames(), count)]
 
 
 def codec_costs(keyframe: Keyframe) -> list[Cost]:

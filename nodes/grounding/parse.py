@@ -37,7 +37,6 @@ class Draft:
 @dataclass
 class _Build:
     target: Piece | None = None
-    leading: list[Piece] = field(default_factory=list)  # things said where a target may stand
     clauses: list[Clause] = field(default_factory=list)
     room: str = ""
     outside: bool = False

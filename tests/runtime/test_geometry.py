@@ -61,14 +61,6 @@ def test_yaw_box_of_one_point_and_of_a_turned_rectangle() -> None:
     assert np.allclose(g.yaw_box(points), [0, 0, 0.5, 2, 1, 1, yaw], atol=1e-4)
 
 
-def test_points_in_polygon() -> None:
-    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
-    points = np.array([[0.5, 0.5], [1.5, 0.5], [-0.1, 0.2]])
-    assert g.points_in_polygon(points, square).tolist() == [True, False, False]
-    assert not g.points_in_polygon(points, square[:2]).any()
-    assert g.points_in_polygon(np.zeros((0, 2)), square).shape == (0,)
-
-
 def test_footprint_of_few_points() -> None:
     assert g.convex_footprint(np.array([[1.0, 2.0, 0.0]])).tolist() == [[1.0, 2.0]]
     inner = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 5], [1, 1, 1]], float)
