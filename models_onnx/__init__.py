@@ -43,6 +43,14 @@ class Instances:
     masks: Masks
 
 
+@dataclass(frozen=True)
+class ScoredMasks:
+    """Masks (H, W) bool of the whole image, best first, with scores (N,) in 0..1."""
+
+    masks: Masks
+    scores: F32
+
+
 @runtime_checkable
 class Tagger(Protocol):
     """Image to names."""
@@ -76,4 +84,13 @@ class InstanceSegmenter(Protocol):
 
     def instances(self, image: U8, names: Sequence[str]) -> Instances:
         """Boxes of what was found, each with its mask."""
+        ...
+
+
+@runtime_checkable
+class LocationDetector(Protocol):
+    """Bird's-eye image of a room to the places in it whose objects are used together."""
+
+    def locate(self, image: U8) -> ScoredMasks:
+        """One mask for each location that was found; masks may overlap."""
         ...

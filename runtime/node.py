@@ -16,6 +16,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Message
 
 NODES = "placegraph.nodes"
+EXTRAS = {"depthai": "oak", "embreex": "demo", "trimesh": "demo"}  # which extra brings an optional package
 
 
 class NodeConfig(BaseModel):
@@ -100,7 +101,10 @@ def plugin(package: str, name: str, export: str, what: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.startswith("placegraph."):
             raise
-        raise ConfigError(f"{what} {name!r} needs the package {error.name!r}: see the extras in README") from error
+        package_name = error.name.split(".")[0]
+        extra = EXTRAS.get(package_name)
+        how = f"pip install 'placegraph[{extra}]'" if extra else "see the extras in README"
+        raise ConfigError(f"{what} {name!r} needs the package {package_name!r}: {how}") from error
     found = getattr(module, export, None)
     if found is None:
         raise ConfigError(f"{package}.{name} exports no {export}")

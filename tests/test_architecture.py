@@ -22,12 +22,14 @@ RING_OF_FOLDER = {"models_onnx": 1, "nodes": 2, "tools": 4, "configs": 4}
 ONLY_IMPORTERS = {
     "zenoh": ("runtime/bus.py",),
     "rerun": ("runtime/recording.py", "nodes/recorder/"),
-    "onnxruntime": ("models_onnx/session.py",),
+    "onnxruntime": ("models_onnx/session.py", "tools/train/export.py"),
     "kiss_icp": ("nodes/pose/odometry.py",),
     "llama_cpp": ("nodes/grounding/llm.py",),
     "wordllama": ("models_onnx/text.py",),
     "depthai": ("nodes/camera/oak.py",),
-    "onnx": ("tools/drawn_scene_network.py",),
+    "onnx": ("tools/drawn_scene_network.py", "tools/train/export.py"),
+    "torch": ("tools/train/",),
+    "embreex": ("tools/house/",),
     "typer": ("tools/",),
     "rich": ("tools/",),
 }

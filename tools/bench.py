@@ -19,7 +19,7 @@ from typing import Annotated, TypeVar
 import numpy as np
 import typer
 
-from placegraph.nodes.camera.synthetic import Synthetic
+from placegraph.nodes.camera.flat import Flat
 from placegraph.runtime.bus import Bus, BusConfig, free_endpoint
 from placegraph.runtime.codec import decode, encode
 from placegraph.runtime.errors import PlacegraphError
@@ -70,7 +70,7 @@ def _timed_ms(action: Callable[[], T], clock: Clock = CPU) -> tuple[float, T]:
 
 def drawn_keyframes(count: int, width: int, height: int) -> list[Keyframe]:
     """Keyframes evenly along the drawn scene's walk, at their true poses; one keyframe: the walk's start."""
-    source = Synthetic(Path(), {"width": width, "height": height, "frames": max(count, 2)})
+    source = Flat(Path(), {"width": width, "height": height, "frames": max(count, 2)})
     return [Keyframe.of(frame, frame.given_world_from_camera) for frame in islice(source.frames(), count)]
 
 
@@ -139,7 +139,7 @@ def _between_threads_ms(payload: bytes) -> float:
 
 def pose_cost() -> Cost:
     """One step of odometry on 640x480, against the time to the camera's next frame."""
-    source = Synthetic(Path(), IMAGE)
+    source = Flat(Path(), IMAGE)
     node = build_node("pose", {}, Context())
     times_ms = [_timed_ms(partial(node.step, frame))[0] for frame in islice(source.frames(), POSE_FRAMES)]
     return Cost("pose: one frame", statistics.median(times_ms[1:]), "frame period at 30 Hz", FRAME_PERIOD_MS)

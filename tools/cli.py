@@ -23,6 +23,8 @@ from placegraph.tools import (
     run,
     view,
 )
+from placegraph.tools.house.command import house
+from placegraph.tools.train import command as train
 
 app = typer.Typer(
     help="Hierarchical 3D scene graphs from RGB-D frames, and answers to questions about them.",
@@ -42,10 +44,12 @@ COMMANDS: tuple[Callable[..., None], ...] = (
     doctor.doctor,
     bench.bench,
     references.references,
+    house,
 )
 for command in COMMANDS:
     app.command()(command)
 app.add_typer(models.app, name="models")
+app.add_typer(train.app, name="train")
 
 
 def main() -> None:

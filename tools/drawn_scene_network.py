@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from placegraph import models_onnx
 from placegraph.models_onnx.manifest import Weights
 from placegraph.models_onnx.semantic import FAMILY
-from placegraph.nodes.camera._drawn_scene import CLASSES
-from placegraph.nodes.camera.synthetic import SOURCE
+from placegraph.nodes.camera._flat import CLASSES
+from placegraph.nodes.camera.flat import SOURCE
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
 
 OUTPUT = Path(str(models_onnx.__file__)).parent / "embedded" / "drawn_scene.onnx"
 TRAIN_SEEDS = range(100, 124)
-TEST_SEEDS = (0, 1, 2)  # 0 is the demo's
+TEST_SEEDS = (0, 1, 2)  # 0 is that of configs/flat.toml
 HIDDEN = 24
 DARK = 0.05  # added to the sum of the channels: keeps the chromaticity of black from being noise alone
 STEPS, BATCH, RATE = 4000, 4096, 0.01

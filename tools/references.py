@@ -21,10 +21,10 @@ from placegraph.tools.run import with_settings
 FOLDER = Path(__file__).parents[1] / "tests" / "replay"
 RECORDING, SUMMARY = "house.rec", "house.txt"
 
-# Three runs, which stay under 2 MB together: many small images of configs/demo.toml, since odometry needs small steps;
+# Three runs, which stay under 2 MB together: many small images of configs/flat.toml, since odometry needs small steps;
 # a few larger ones along the whole walk, since networks need large things; and on those again the paper's three
 # networks in place of the one pass. The drawn scene's network does the work of each.
-DATAFLOW = Path("demo.toml")
+DATAFLOW = Path("flat.toml")
 WALK: dict[str, dict[str, Any]] = {
     "camera": {"limit": 40, "settings": {"width": 64, "height": 48}},
     "pose": {"method": "kiss_icp", "stride": 1},
@@ -68,7 +68,7 @@ def _run(dataflow: Dataflow, kept: Iterable[str], drive: Callable[[Inline], None
     return taps
 
 
-def _part_of_demo(settings: dict[str, dict[str, Any]], *left_out: str) -> Dataflow:
+def _part_of_flat(settings: dict[str, dict[str, Any]], *left_out: str) -> Dataflow:
     config = with_settings(read(DATAFLOW), settings)
     nodes = {name: node for name, node in config.nodes.items() if name not in (*LEFT_OUT, *left_out)}
     return build(config.model_copy(update={"nodes": nodes}))
@@ -94,7 +94,7 @@ def _run_and_ask(shell: Inline) -> None:
 def make() -> Reference:
     """Run the drawn scene through every node, with the language model; the same code gives the same reference."""
     replies: dict[str, Any] = {}
-    walk, house = _part_of_demo(WALK, "fusion", "hierarchy", "grounding"), _part_of_demo(HOUSE)
+    walk, house = _part_of_flat(WALK, "fusion", "hierarchy", "grounding"), _part_of_flat(HOUSE)
     built = {name: build_node(name, settings, Context()) for name, settings in THREE.items()}
     three = Dataflow(RunConfig(nodes=THREE), Context(), built)
     with language_model_replies(replies, ask=True):

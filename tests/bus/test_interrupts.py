@@ -20,7 +20,7 @@ from placegraph.tools.map_folder import GRAPH, Collector
 from placegraph.tools.run import _keep, run_dataflow
 
 NODES = """[nodes.camera]
-source = "synthetic"
+source = "flat"
 realtime = true
 [nodes.pose]
 method = "given"
@@ -75,7 +75,7 @@ def test_live_it_is_not_waited_for_ever_for_a_keyframe_that_is_lost(
 ) -> None:
     monkeypatch.setattr("placegraph.tools.run.FINISH_TIMEOUT_S", 1.0)
     monkeypatch.setattr("placegraph.runtime.launch.TERMINATE_TIMEOUT_S", 0.5)
-    camera = {"source": "synthetic", "realtime": True, "limit": 25, "settings": {"width": 64, "height": 48}}
+    camera = {"source": "flat", "realtime": True, "limit": 25, "settings": {"width": 64, "height": 48}}
     nodes = {"camera": camera, "pose": {"method": "given"}, "keyframe": {}, "instances": {"model": "drawn_scene"}}
     config = RunConfig(bus=bus_config, nodes=nodes | {"fusion": {}, "hierarchy": {}})
 
@@ -99,7 +99,7 @@ def test_live_it_is_not_waited_for_ever_for_a_keyframe_that_is_lost(
 
 @pytest.mark.parametrize("writable", [True, False])
 def test_a_run_that_fails_keeps_what_it_mapped(tmp_path: Path, writable: bool) -> None:
-    camera = {"source": "synthetic", "limit": 40, "settings": {"width": 64, "height": 48}}
+    camera = {"source": "flat", "limit": 40, "settings": {"width": 64, "height": 48}}
     nodes = {"camera": camera, "pose": {"method": "given"}, "keyframe": {}, "instances": {"model": "drawn_scene"}}
     dataflow = build(RunConfig(nodes=nodes | {"fusion": {"map_every": 1}, "hierarchy": {}}))
     collector, folder = Collector(dataflow), tmp_path / "map"

@@ -23,7 +23,7 @@ FRAMES = 14
 
 def flow(bus_config: BusConfig, folder: Path, limit: int = FRAMES, **camera: object) -> Dataflow:
     nodes = {
-        "camera": {"source": "synthetic", "limit": limit, "settings": {"width": 160, "height": 120}, **camera},
+        "camera": {"source": "flat", "limit": limit, "settings": {"width": 160, "height": 120}, **camera},
         "pose": {"stride": 2},
         "keyframe": {"translation_m": 0.02, "lost_after_s": 2.0},
         "instances": {"model": "drawn_scene"},
@@ -160,7 +160,7 @@ def test_children_end_when_their_launcher_is_killed(tmp_path, wait_until) -> Non
         "import sys, time\nfrom pathlib import Path\n"
         "from placegraph.runtime.bus import BusConfig, free_endpoint\n"
         "from placegraph.runtime.config import RunConfig, build\nfrom placegraph.runtime.launch import Launcher\n"
-        "nodes = {'camera': {'source': 'synthetic'}, 'pose': {}}\n"
+        "nodes = {'camera': {'source': 'flat'}, 'pose': {}}\n"
         "config = RunConfig(bus=BusConfig(endpoint=free_endpoint()), nodes=nodes)\n"
         f"launcher = Launcher(build(config), Path({str(tmp_path)!r}))\nlauncher.start()\n"
         "print(*launcher.pids().values(), flush=True)\ntime.sleep(60)\n"
@@ -182,8 +182,7 @@ def test_children_end_when_their_launcher_is_killed(tmp_path, wait_until) -> Non
 def test_an_interrupted_run_ends_in_order_and_leaves_nothing(tmp_path, number, bus_config, wait_until) -> None:
     config = tmp_path / "flow.toml"
     config.write_text(
-        f'[bus]\nendpoint = "{bus_config.endpoint}"\n'
-        '[nodes.camera]\nsource = "synthetic"\nrealtime = true\n[nodes.pose]\n'
+        f'[bus]\nendpoint = "{bus_config.endpoint}"\n[nodes.camera]\nsource = "flat"\nrealtime = true\n[nodes.pose]\n'
     )
     command = [sys.executable, "-m", "placegraph.tools.cli", "run", str(config), "--out", str(tmp_path / "out")]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

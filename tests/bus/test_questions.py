@@ -31,7 +31,7 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path
     config = folder / "small.toml"
     nodes = "\n".join(f"[nodes.{name}]" for name in ("fusion", "hierarchy", "grounding"))
     config.write_text(
-        '[nodes.camera]\nsource = "synthetic"\nsettings = { width = 160, height = 120, frames = 120 }\nlimit = 45\n'
+        '[nodes.camera]\nsource = "flat"\nsettings = { width = 160, height = 120, frames = 120 }\nlimit = 45\n'
         '[nodes.pose]\nmethod = "given"\n[nodes.keyframe]\n[nodes.instances]\nmodel = "drawn_scene"\n' + nodes
     )
     command = [sys.executable, "-m", "placegraph.tools.cli", "run", str(config)]

@@ -6,7 +6,7 @@ from placegraph.runtime.config import build, read
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import Frame, Keyframe, Pose, Segments
 
-CAMERA = '[nodes.camera]\nsource = "synthetic"\n'
+CAMERA = '[nodes.camera]\nsource = "flat"\n'
 
 
 def written(folder: Path, text: str) -> Path:

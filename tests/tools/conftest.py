@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from placegraph.nodes.camera.synthetic import Synthetic
+from placegraph.nodes.camera.flat import Flat
 from placegraph.runtime.bus import free_endpoint
 from placegraph.tools.cli import main
 
@@ -45,7 +45,7 @@ use_model = false
 
 [nodes.recorder]
 """
-DRAWN = """source = "synthetic"
+DRAWN = """source = "flat"
 limit = 20
 
 [nodes.camera.settings]
@@ -143,7 +143,7 @@ def seven(tmp_path: Path) -> Path:
     """A 7-Scenes folder of four drawn frames, 64x48."""
     folder = tmp_path / "seven"
     folder.mkdir()
-    source = Synthetic(Path(), {"width": 64, "height": 48, "frames": 4})
+    source = Flat(Path(), {"width": 64, "height": 48, "frames": 4})
     for frame in source.frames():
         stem = folder / f"frame-{frame.frame_id:06d}"
         assert cv2.imwrite(f"{stem}.color.jpg", frame.color[..., ::-1])

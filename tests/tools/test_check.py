@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-START = '[nodes.camera]\nsource = "synthetic"\n[nodes.pose]\n[nodes.keyframe]\n'
+START = '[nodes.camera]\nsource = "flat"\n[nodes.pose]\n[nodes.keyframe]\n'
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def test_effective_settings_with_their_defaults(cli, drawn_flow) -> None:
     assert done.code == 0 and done.err == ""
     lines = done.out.splitlines()
     assert lines[0] == f"{drawn_flow}: 8 nodes, replay"
-    assert lines[1:3] == ["[nodes.camera]", '  source = "synthetic"']
+    assert lines[1:3] == ["[nodes.camera]", '  source = "flat"']
     assert '  method = "given"' in lines and "  realtime = false" in lines
 
 
@@ -66,13 +66,13 @@ def test_a_source_is_checked_with_it(cli, folder_flow, seven, tmp_path) -> None:
         (START + 'stride = "2"\n[nodes.poze]\n', "[nodes.keyframe] stride: Extra inputs are not permitted"),
         (START + "[nodes.poze]\n", "no node named 'poze'; there are: camera, "),
         (START + "[nodes.instances]\n[nodes.instances.model]\na = 1\n", "[nodes.instances] model: "),
-        ('[nodes.camera]\nsource = "synthetik"\n', "no camera source named 'synthetik'; there are: oak, "),
+        ('[nodes.camera]\nsource = "synthetik"\n', "no camera source named 'synthetik'; there are: flat, "),
         ("[nodes.camera]\n", "[nodes.camera] path is empty: give a path, or a source: "),
         (
             START.replace("[nodes.pose]", "[nodes.camera.settings]\nwdth = 9\n[nodes.pose]"),
             "[nodes.camera.settings] wdth: ",
         ),
-        ('[nodes.camera]\nsource = "synthetic"\n[nodes.fusion]\n', "fusion takes Keyframe, which nothing gives"),
+        ('[nodes.camera]\nsource = "flat"\n[nodes.fusion]\n', "fusion takes Keyframe, which nothing gives"),
         ("[nodes.pose]\n", "expected one source (camera or playback), found none"),
     ],
 )

@@ -5,7 +5,7 @@ import pytest
 
 from placegraph.models_onnx.manifest import Weights, find
 from placegraph.models_onnx.semantic import FAMILY
-from placegraph.nodes.camera._drawn_scene import CLASSES
+from placegraph.nodes.camera._flat import CLASSES
 from placegraph.tools import drawn_scene_network as tool
 
 

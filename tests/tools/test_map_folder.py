@@ -18,7 +18,7 @@ from placegraph.tools.map_folder import (
     write_trajectory,
 )
 
-START = {"camera": {"source": "synthetic"}, "pose": {"method": "given"}, "keyframe": {}}
+START = {"camera": {"source": "flat"}, "pose": {"method": "given"}, "keyframe": {}}
 MAPPING = START | {"instances": {"model": "drawn_scene"}, "fusion": {}, "hierarchy": {}}
 
 

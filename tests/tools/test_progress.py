@@ -9,7 +9,7 @@ from placegraph.runtime.messages import Health
 from placegraph.tools import progress as module
 from placegraph.tools.progress import Progress
 
-NODES = {"camera": {"source": "synthetic"}, "pose": {"method": "given"}}
+NODES = {"camera": {"source": "flat"}, "pose": {"method": "given"}}
 
 
 def flow(**camera):

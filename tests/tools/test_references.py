@@ -41,7 +41,7 @@ def test_each_node_is_kept_with_its_settings_and_steps(small: Path) -> None:
     reference = Reference.read(small / tool.RECORDING)
     assert list(reference.steps) == [*tool.IN_WALK, *tool.IN_HOUSE, *tool.THREE]
     assert reference.settings["pose"] == {"method": "kiss_icp", "stride": 1}
-    assert reference.settings["instances"] == {"model": "drawn_scene"}  # what demo.toml says
+    assert reference.settings["instances"] == {"model": "drawn_scene"}  # what flat.toml says
     assert reference.settings["grounding"] == {"name_places": False, "use_model": False}
     asked = [message.text for message in reference.messages if isinstance(message, Question)]
     assert asked == ["the sofa", ""]

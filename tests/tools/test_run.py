@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from placegraph.nodes.camera.synthetic import Synthetic
+from placegraph.nodes.camera.flat import Flat
 from placegraph.runtime.bus import Bus, BusConfig, free_endpoint
 from placegraph.runtime.scene_graph import SceneGraph
 
@@ -44,7 +44,7 @@ def test_the_trajectory_is_that_of_the_walk(mapped) -> None:
     header, *lines = (mapped / "trajectory.txt").read_text().splitlines()
     assert header == "# seconds tx ty tz qx qy qz qw" and len(lines) == 20
     rows = np.array([line.split() for line in lines], float)
-    given = Synthetic(mapped, {"width": 160, "height": 120}).given_poses()
+    given = Flat(mapped, {"width": 160, "height": 120}).given_poses()
     for (stamp_ns, pose), row in zip(list(given.items())[:20], rows, strict=True):
         assert row[0] == pytest.approx(stamp_ns / 1e9) and row[1:4] == pytest.approx(pose[:3, 3], abs=1e-6)
     assert np.linalg.norm(rows[:, 4:], axis=1) == pytest.approx(1)

@@ -20,7 +20,7 @@ def camera(**settings: object) -> Camera:
 
 
 def drawn(**settings: object) -> Camera:
-    return camera(source="synthetic", settings={"width": 32, "height": 24, "frames": 3}, **settings)
+    return camera(source="flat", settings={"width": 32, "height": 24, "frames": 3}, **settings)
 
 
 def test_auto_without_a_path_asks_for_one():
@@ -55,7 +55,7 @@ def test_auto_on_a_folder_of_two_formats_asks_which(seven: Path):
 
 
 def test_unknown_source_lists_the_choices():
-    with pytest.raises(ConfigError, match=r"no camera source named 'webcam'.*synthetic"):
+    with pytest.raises(ConfigError, match=r"no camera source named 'webcam'.*flat"):
         find("webcam")
 
 
@@ -117,5 +117,5 @@ def test_a_source_is_let_go_when_the_stream_is_closed():
 def test_a_source_without_frames_is_an_error_not_an_empty_run():
     node = drawn()
     node.source.poses = np.zeros((0, 4, 4))
-    with pytest.raises(SourceError, match="synthetic: the source gave no frame"):
+    with pytest.raises(SourceError, match="flat: the source gave no frame"):
         list(node.messages())

@@ -1,6 +1,6 @@
-"""The drawn scene: a kitchen and a living room joined by a doorway, made of coloured boxes, and a walk through both.
+"""The drawn flat: a kitchen and a living room joined by a doorway, made of coloured boxes, and a walk through both.
 
-Metres; world frame with z up, the kitchen's south-west corner at the origin. All of it is made up for the demo.
+Metres; world frame with z up, the kitchen's south-west corner at the origin. All of it is made up.
 """
 
 from __future__ import annotations

@@ -1,0 +1,93 @@
+"""A map folder laid onto its truth: what its graph holds, in the world frame of the given poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.geometry import bounding_box, transform
+from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.tools.map_folder import OBJECTS, find_graph
+
+F64 = NDArray[np.float64]
+
+_HEADER = ("element vertex ", ["property float x", "property float y", "property float z", "property int object"])
+_ROW = np.dtype([("xyz", "<f4", 3), ("object", "<i4")])
+
+
+@dataclass(frozen=True, eq=False)
+class MapObject:
+    """One object of the map: tags, strongest first, and its axis-aligned box (2, 3) in metres, true world frame."""
+
+    id: str
+    tags: tuple[Tag, ...]
+    box: F64
+
+
+@dataclass(frozen=True, eq=False)
+class MapPlace:
+    """A room or location: the number of its floor in `AlignedMap.floors`, and its outline (N, 2), true world frame."""
+
+    id: str
+    floor: int
+    outline: F64
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedMap:
+    """All layers of a map; floors (F, 2) are their lowest and highest height, true world frame."""
+
+    floors: F64
+    rooms: tuple[MapPlace, ...]
+    locations: tuple[MapPlace, ...]
+    objects: tuple[MapObject, ...]
+
+
+def read_aligned(folder: Path, true_from_map: F64) -> AlignedMap:
+    """Read a map folder's graph and object clouds and move them by a turn about z and a shift (4, 4).
+
+    A turned box would be too large, so boxes are made anew from the moved clouds. Raises SchemaError.
+    """
+    graph = SceneGraph.load(find_graph(folder))
+    clouds = read_object_clouds(folder / OBJECTS)
+    floors = graph.layer("floor")
+    number = {floor.id: i for i, floor in enumerate(floors)}
+    objects = []
+    for node in graph.layer("object"):
+        if node.id not in clouds:
+            raise SchemaError(f"{folder / OBJECTS}: no points of {node.id}, which the graph holds; of another run?")
+        box = bounding_box(transform(true_from_map, clouds[node.id].astype(np.float64)))
+        objects.append(MapObject(node.id, node.tags, box.astype(np.float64)))
+
+    def places(layer: str) -> tuple[MapPlace, ...]:
+        return tuple(_place(graph, number, node, true_from_map) for node in graph.layer(layer))
+
+    heights = np.array([floor.box[:, 2] for floor in floors]).reshape(-1, 2) + true_from_map[2, 3]
+    return AlignedMap(heights, places("room"), places("location"), tuple(objects))
+
+
+def _place(graph: SceneGraph, number: dict[str, int], node: Node, true_from_map: F64) -> MapPlace:
+    floor = next(step.id for step in graph.path(node.id) if step.layer == "floor")
+    outline = node.footprint @ true_from_map[:2, :2].T + true_from_map[:2, 3]
+    return MapPlace(node.id, number[floor], np.asarray(outline))
+
+
+def read_object_clouds(file: Path) -> dict[str, NDArray[np.float32]]:
+    """Points (N, 3) in metres, map frame, of each object by its id, of a map folder's objects.ply; raises SchemaError."""
+    try:
+        header, _, body = file.read_bytes().partition(b"end_header\n")
+    except OSError as error:
+        raise SchemaError(f"{file}: cannot read: {error.strerror}") from None
+    lines = header.decode("ascii", "replace").splitlines()
+    wrong = lines[:2] != ["ply", "format binary_little_endian 1.0"] or lines[3:] != _HEADER[1]
+    if wrong or not lines[2].startswith(_HEADER[0]) or len(body) % _ROW.itemsize:
+        raise SchemaError(f"{file}: not the objects' points that `placegraph run` writes")
+    rows = np.frombuffer(body, _ROW)
+    order = np.argsort(rows["object"], kind="stable")
+    numbers, starts = np.unique(rows["object"][order], return_index=True)
+    parts = np.split(rows["xyz"][order], starts[1:])
+    return {f"O{number}": part for number, part in zip(numbers.tolist(), parts, strict=True)} if len(rows) else {}

@@ -1,0 +1,104 @@
+"""Views of the evaluation houses with what is asked of them: boxes, tags and masks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.runtime.errors import ConfigError
+from placegraph.tools.evaluate.detection import TrueBoxes
+from placegraph.tools.house.build import generator_version
+from placegraph.tools.house.classes import NAMES
+from placegraph.tools.train.samples import LEAST_SHARE, Shard, load_shards
+from placegraph.tools.train.views import EVALUATION_SEEDS, render_houses
+
+U8 = NDArray[np.uint8]
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluationView:
+    """One view: color (H, W, 3) sRGB, depth (H, W) in m, instance (H, W), and its objects, each of which is `small`
+    (visible px under LEAST_SHARE of the image, as in training) or `cut` (its box touches the image's border), or not.
+    """
+
+    color: U8
+    depth_m: F32
+    instance: NDArray[np.uint16]
+    items: NDArray[np.int64]  # (M,); the instance image holds item + 1
+    classes: NDArray[np.int64]  # (M,)
+    boxes: F64  # (M, 4) x0 y0 x1 y1 px
+    small: Bools  # (M,)
+    cut: Bools  # (M,)
+
+    def true_boxes(self, with_cut: bool) -> TrueBoxes:
+        """Boxes to find: small ones are ignored, and cut ones unless `with_cut`."""
+        return TrueBoxes(self.boxes, self.classes, self.small if with_cut else self.small | self.cut)
+
+    @property
+    def tags(self) -> F64:
+        """(classes,) 1 for what is shown, 0 for what is not, NaN where all there is of a class is small."""
+        found = np.zeros(len(NAMES))
+        found[self.classes] = np.nan
+        found[self.classes[~self.small]] = 1.0
+        return found
+
+    @property
+    def asked_boxes(self) -> F32:
+        """(N, 4) px boxes of the objects that the segmenter is asked for: all that are not small."""
+        return self.boxes[~self.small].astype(np.float32)
+
+    def asked_masks(self) -> list[Bools]:
+        """The visible pixels (H, W) of each of those."""
+        return [np.asarray(self.instance == item + 1) for item in self.items[~self.small].tolist()]
+
+
+def evaluation_shards(houses: int, views: int, data: Path) -> list[Shard]:
+    """The first `houses` evaluation houses with at most `views` views each, rendered into `data` unless they are there.
+
+    Raises ConfigError when there are not so many.
+    """
+    if houses > len(EVALUATION_SEEDS):
+        raise ConfigError(f"--houses: at most {len(EVALUATION_SEEDS)} seeds are set aside for evaluation")
+    folder = shard_folder(views, data)
+    seeds = list(EVALUATION_SEEDS[:houses])
+    absent = [seed for seed in seeds if not (folder / str(seed)).exists()]
+    if absent:
+        render_houses(absent, views, folder)
+    return load_shards(folder)[:houses]  # by seed, so the first ones
+
+
+def shard_folder(views: int, data: Path) -> Path:
+    """Where shards lie: apart for each number of views and each version of the generator."""
+    return data / f"{generator_version()}-{views}"
+
+
+def evaluation_views(shards: Sequence[Shard]) -> Iterator[EvaluationView]:
+    """Every view, by house."""
+    for shard in shards:
+        for k in range(len(shard.color)):
+            yield evaluation_view(shard.color[k], shard.depth[k], shard.instance[k], shard.boxes[k])
+
+
+def evaluation_view(
+    color: U8, depth_mm: NDArray[np.uint16], instance: NDArray[np.uint16], rows: NDArray[np.float32]
+) -> EvaluationView:
+    """A view of a shard; rows (M, 7): item, class, x0 y0 x1 y1 (exclusive), visible px."""
+    height, width = instance.shape
+    boxes = rows[:, 2:6].astype(np.float64)
+    return EvaluationView(
+        color=np.array(color),
+        depth_m=np.asarray(depth_mm, np.float32) / np.float32(1000),
+        instance=np.array(instance),
+        items=rows[:, 0].astype(np.int64),
+        classes=rows[:, 1].astype(np.int64),
+        boxes=boxes,
+        small=rows[:, 6] < LEAST_SHARE * height * width,
+        cut=((boxes[:, :2] <= 0) | (boxes[:, 2:] >= (width, height))).any(axis=1),
+    )

@@ -1,0 +1,92 @@
+"""A whole house from its seed, and the frames that a camera sees on a walk through it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from placegraph.tools.house.furnish import furnish
+from placegraph.tools.house.model import House
+from placegraph.tools.house.plan import lay_out
+from placegraph.tools.house.render import Renderer
+from placegraph.tools.house.sensor import house_settings, sense
+from placegraph.tools.house.walk import walk
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+U8 = NDArray[np.uint8]
+U16 = NDArray[np.uint16]
+
+SENSOR_SALT = 7_001  # keeps the sensor's noise apart from what else is drawn from the seed
+DEPTH_STEPS_PER_M = 5000  # the depth factor of TUM RGB-D folders; 16 bit reach to 13.1 m
+
+
+class HouseFrame(NamedTuple):
+    """One frame with its truth; depth is a whole number of steps of 1 / DEPTH_STEPS_PER_M metres, 0 = no reading."""
+
+    frame_id: int
+    stamp_ns: int
+    color: U8  # (H, W, 3) sRGB
+    depth_m: F32  # (H, W)
+    instance: U16  # (H, W) item id + 1, 0 = the building
+    world_from_camera: F64  # (4, 4)
+
+    @property
+    def depth_steps(self) -> U16:
+        """(H, W) depth as the integers that a sensor gives."""
+        return np.round(self.depth_m * DEPTH_STEPS_PER_M).astype(np.uint16)
+
+
+def build(seed: int, floors: int | None = None) -> House:
+    """The furnished house of a seed, of so many floors (None: the seed chooses)."""
+    return furnish(lay_out(seed, floors), seed)
+
+
+class HouseFrames:
+    """The frames of one house along its walk; each is made by itself, so any may be made first, in any process."""
+
+    def __init__(self, seed: int, floors: int | None = None, width: int = 640, height: int = 480) -> None:
+        self.house = build(seed, floors)
+        self.stamps_ns, self.world_from_camera = walk(self.house, seed)
+        self._sensor_settings = house_settings(seed)
+        self._renderer = Renderer(self.house, width, height)
+        self.intrinsics: F64 = np.asarray(self._renderer.intrinsics, np.float64)  # (4,) fx fy cx cy in px
+
+    def count(self, limit: int = 0) -> int:
+        """How many frames there are, at most `limit` (0: all)."""
+        return min(limit or len(self.stamps_ns), len(self.stamps_ns))
+
+    def frames(self, limit: int = 0) -> Iterator[HouseFrame]:
+        """Frames in order of time, at most `limit` (0: all)."""
+        return (self.frame(index) for index in range(self.count(limit)))
+
+    def frame(self, index: int) -> HouseFrame:
+        """The frame of that index."""
+        pose = np.asarray(self.world_from_camera[index], np.float64)
+        view = self._renderer.render(pose)
+        # a generator of its own for each frame: no frame depends on those made before it
+        random = np.random.default_rng([self.house.seed, SENSOR_SALT, index])
+        color, depth_m = sense(view, self.intrinsics, random, self._sensor_settings)
+        return HouseFrame(index, int(self.stamps_ns[index]), color, quantised(depth_m), view.instance, pose)
+
+
+def quantised(depth_m: F32) -> F32:
+    """(H, W) depth in metres, rounded to the steps of 16 bit; what does not fit or is not finite is no reading."""
+    steps = np.round(np.asarray(depth_m, np.float64) * DEPTH_STEPS_PER_M)
+    fits = np.isfinite(steps) & (steps > 0) & (steps <= np.iinfo(np.uint16).max)
+    return (np.where(fits, steps, 0) / DEPTH_STEPS_PER_M).astype(np.float32)
+
+
+@cache  # of the sources as they were when this process began
+def generator_version() -> str:
+    """A checksum of the generator's own sources: equal seeds give equal bytes while it stays the same."""
+    folder, digest = Path(__file__).parent, hashlib.sha256()
+    for file in sorted(folder.rglob("*.py"), key=lambda file: file.relative_to(folder).as_posix()):
+        digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()[:12]

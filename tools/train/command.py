@@ -1,0 +1,75 @@
+"""`placegraph train`: from houses to the embedded networks, in steps that can be stopped and gone on with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from placegraph.runtime.errors import ConfigError
+
+app = typer.Typer(
+    help="Train the embedded networks on procedural houses (extra `train`); every step goes on where it was stopped.",
+    no_args_is_help=True,
+)
+Data = Annotated[Path, typer.Option(help="Folder of the rendered views.")]
+Work = Annotated[Path, typer.Option(help="Folder of checkpoints and exported files.")]
+Steps = Annotated[int, typer.Option(min=1, help="Training steps in all.")]
+Threads = Annotated[int, typer.Option(min=1, help="Threads of PyTorch.")]
+
+
+@app.command()
+def views(
+    data: Data,
+    houses: Annotated[int, typer.Option(min=1, help="How many houses.")] = 360,
+    each: Annotated[int, typer.Option(min=1, help="Views of each.")] = 24,
+    calibration: Annotated[
+        bool, typer.Option(help="Houses kept aside for choosing INT8 ranges and thresholds.")
+    ] = False,
+) -> None:
+    """Render the views that the networks are trained on."""
+    from placegraph.tools.train.views import CALIBRATION_SEEDS, TRAINING_SEEDS, render_houses
+
+    seeds = CALIBRATION_SEEDS if calibration else TRAINING_SEEDS
+    if houses > len(seeds):
+        raise ConfigError(f"--houses: at most {len(seeds)} seeds are set aside for this")
+    render_houses(list(seeds[:houses]), each, data)
+
+
+@app.command()
+def objects(data: Data, work: Work, steps: Steps = 9000, threads: Threads = 2) -> None:
+    """Train the detector, with the dense head from which the tagger is made."""
+    from placegraph.tools.train.objects import train_objects
+
+    train_objects(data, work / "objects.pt", steps, threads=threads)
+
+
+@app.command()
+def tags(data: Data, work: Work, steps: Steps = 1000, threads: Threads = 2) -> None:
+    """Tune the tagger; needs the trained objects."""
+    from placegraph.tools.train.loop import read_average
+    from placegraph.tools.train.networks import ObjectNetwork
+    from placegraph.tools.train.tags import train_tagger
+
+    train_tagger(data, read_average(work / "objects.pt", ObjectNetwork()), work / "tags.pt", steps, threads=threads)
+
+
+@app.command()
+def masks(data: Data, work: Work, steps: Steps = 4000, threads: Threads = 2) -> None:
+    """Train the segmenter."""
+    from placegraph.tools.train.masks import train_masks
+
+    train_masks(data, work / "masks.pt", steps, threads=threads)
+
+
+@app.command()
+def export(
+    work: Work,
+    calibration: Annotated[Path, typer.Option(help="Views kept aside: `placegraph train views --calibration`.")],
+) -> None:
+    """Write float and INT8 ONNX files of what is trained into WORK/onnx, with thresholds and checksums."""
+    from placegraph.tools.train.pack import pack
+
+    for line in pack(work, calibration):
+        print(line)
