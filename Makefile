@@ -1,24 +1,31 @@
-# make demo: set everything up and map the drawn flat.  make test: set everything up and run the tests.
+# make demo: set everything up and map a house.  make test: set everything up and run the tests.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 OUT ?= out/demo
+# rendered once, then kept
+HOUSE ?= out/house
 
 # No wheel of llama-cpp-python is on PyPI: it compiles once (7 minutes on two cores), after that pip's cache has it.
 # Native code would crash on CPUs that advertise AMX where the kernel forbids it.
 export CMAKE_ARGS ?= -DGGML_NATIVE=OFF -DLLAVA_BUILD=OFF
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt
 
+QUESTIONS = "where is the sofa" "the monitor upstairs" "which chair is closest to the stove" \
+    "the lamp on the nightstand" "find the swimming pool"
+
 .PHONY: demo test check clean
 
 demo: $(VENV)/.installed
+	$(BIN)/placegraph house --seed 9002 --floors 2 --out $(HOUSE) --replace
 	rm -rf $(OUT)
-	$(BIN)/placegraph run configs/demo.toml --out $(OUT) --endpoint tcp/127.0.0.1:7461
-	@for question in "which chair is closest to the sofa" "the cup on the table" "the tv on the cabinet" \
-	    "what is the largest table" "find the piano"; do \
+	$(BIN)/placegraph run configs/demo.toml --source $(HOUSE) --out $(OUT) --endpoint tcp/127.0.0.1:7461
+	@for question in $(QUESTIONS); do \
 	    echo; echo "? $$question"; $(BIN)/placegraph ask $(OUT) "$$question" || [ $$? -eq 3 ] || exit 1; \
 	done
-	@echo; echo "look at it:  $(BIN)/placegraph view $(OUT)"
+	@echo; echo "against the truth:"; $(BIN)/placegraph evaluate $(OUT) --source $(HOUSE)
+	@echo; echo "the plan:    $(HOUSE)/plan.png"; echo "the map:     $(OUT)"; \
+	    echo "look at it:  $(BIN)/placegraph view $(OUT)"
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -q
@@ -28,11 +35,11 @@ check: $(VENV)/.installed-dev
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP_INSTALL) --editable .
+	$(PIP_INSTALL) --editable '.[demo]'
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed
-	$(PIP_INSTALL) --editable '.[dev,oak]'
+	$(PIP_INSTALL) --editable '.[dev,demo,oak]'
 	touch $@
 
 clean:

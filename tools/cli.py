@@ -23,6 +23,7 @@ from placegraph.tools import (
     run,
     view,
 )
+from placegraph.tools.evaluate.networks import networks
 from placegraph.tools.house.command import house
 from placegraph.tools.train import command as train
 
@@ -48,6 +49,7 @@ COMMANDS: tuple[Callable[..., None], ...] = (
 )
 for command in COMMANDS:
     app.command()(command)
+app.command("evaluate-networks")(networks)
 app.add_typer(models.app, name="models")
 app.add_typer(train.app, name="train")
 

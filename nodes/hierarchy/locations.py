@@ -2,8 +2,9 @@
 
 Source: paper, location layer, by the recipe that made its training labels: DBSCAN on a height band, each object joins
 the cluster with most of its points, clusters with few objects go, project, outline, drop small and elongated polygons.
-Departs: no trained detector; DBSCAN runs on coarse cells of the objects' points, room by room; the outline is that of
-the closed bird's-eye mask, which like an alpha shape may be concave.
+Departs: DBSCAN runs on coarse cells of the objects' points, room by room; the outline is that of the closed bird's-eye
+mask, which like an alpha shape may be concave. With a `model` its masks decide instead, as in the paper: the objects
+inside a mask are its members, and the outline is drawn around them (departs: mostly inside, since masks are coarse).
 """
 
 from __future__ import annotations
@@ -14,13 +15,17 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from placegraph.models_onnx import LocationDetector
+from placegraph.nodes.hierarchy.bird_eye import bird_eye
 from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.rooms import floor_grid
+from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.geometry import convex_footprint
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -39,6 +44,10 @@ class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     least_area_m2: float = 0.25  # paper (value not stated)
     compactness: float = 0.25  # paper, C in 4 pi S / P^2 < C (value not stated); a 5:1 strip has .44
     close_m: float = 0.2  # departs: stands for the alpha of the alpha shape
+    model: str = ""  # a LocationDetector of the manifest; "": the recipe above
+    min_score: float = Field(default=0.35, ge=0, le=1)  # of the model's masks
+    inside_share: float = Field(default=0.6, gt=0, le=1)  # of an object's points in a mask that make it a member
+    stand_m: float = 0.4  # an object that begins higher hangs or lies on another: it draws no outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +58,58 @@ class LocationArea:
     members: tuple[int, ...]
 
 
-def find_locations(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:
+def find_locations(
+    objects: Sequence[Points], span: FloorSpan, config: LocationConfig, detector: LocationDetector | None = None
+) -> list[LocationArea]:
     """Locations of one room, in the order of their first object.
 
-    objects: the (N, 3) points of each of the room's objects, metres, world frame. Source: paper, "Location Layer",
-    equations 3 to 7.
+    objects: the (N, 3) points of each of the room's objects, metres, world frame; detector: the network that
+    `config.model` names. Source: paper, "Location Layer", equations 3 to 7.
+
+    Raises:
+        ConfigError: the settings name a model and no detector was given.
+        ModelError: the network cannot be run.
     """
+    if detector is not None:
+        return _detect(objects, span, config, detector)
+    if config.model:
+        raise ConfigError(f"locations: model {config.model!r} is named, but no network was loaded")
+    return _recipe(objects, span, config)
+
+
+def _detect(
+    objects: Sequence[Points], span: FloorSpan, config: LocationConfig, detector: LocationDetector
+) -> list[LocationArea]:
+    """Masks of the network in the order of their scores: each takes the objects mostly inside it that are still free."""
+    image, grid = bird_eye(objects, span, config.band_high)
+    if not image.any():
+        return []
+    found = detector.locate(image)
+    top = span.low + config.band_high * (span.high - span.low)
+    banded = [xyz[xyz[:, 2] <= top] for xyz in objects]
+    free = {i for i, xyz in enumerate(banded) if len(xyz)}
+    areas = []
+    for mask, score in zip(found.masks, found.scores.tolist(), strict=True):
+        if score < config.min_score:
+            continue
+        inside = [i for i in sorted(free) if mask[grid.cells(banded[i])].mean() >= config.inside_share]
+        outline = _around([banded[i] for i in inside], span, config)
+        if len(inside) >= config.least_objects and outline is not None:
+            free -= set(inside)
+            areas.append(LocationArea(outline, tuple(inside)))
+    return sorted(areas, key=lambda area: area.members[0])
+
+
+def _around(objects: list[Points], span: FloorSpan, config: LocationConfig) -> F64 | None:
+    """Convex outline (K, 2) of what stands on the floor, of all where nothing does; None where it is too small."""
+    standing = [xyz for xyz in objects if xyz[:, 2].min() <= span.low + config.stand_m]
+    if not objects:
+        return None
+    outline = np.asarray(convex_footprint(np.concatenate(standing or objects)), float)
+    return outline if cv2.contourArea(outline.astype(np.float32)) >= config.least_area_m2 else None
+
+
+def _recipe(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:
     height = span.high - span.low
     low, high = span.low + config.band_low * height, span.low + config.band_high * height
     banded = [xyz[(xyz[:, 2] >= low) & (xyz[:, 2] <= high)] for xyz in objects]

@@ -77,7 +77,7 @@ def _place(graph: SceneGraph, number: dict[str, int], node: Node, true_from_map:
 
 
 def read_object_clouds(file: Path) -> dict[str, NDArray[np.float32]]:
-    """Points (N, 3) in metres, map frame, of each object by its id, of a map folder's objects.ply; raises SchemaError."""
+    """Points (N, 3) in metres, map frame, of each object by its id, from an objects.ply; raises SchemaError."""
     try:
         header, _, body = file.read_bytes().partition(b"end_header\n")
     except OSError as error:

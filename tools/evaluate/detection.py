@@ -63,6 +63,8 @@ def _of_class(found: Sequence[FoundBoxes], true: Sequence[TrueBoxes], k: int, le
         mine, theirs = one.classes == k, truth.classes == k
         counts = theirs & ~truth.ignored
         count += int(counts.sum())
+        if not mine.any():
+            continue
         hit = _matched(one.boxes[mine], truth.boxes[counts], least_iou)
         aside = overlaps(one.boxes[mine], truth.boxes[theirs & truth.ignored]).max(axis=1, initial=0) >= least_iou
         judged = hit | ~aside
@@ -101,4 +103,4 @@ def overlaps(a: F64, b: F64) -> F64:
     shared = np.prod(np.maximum(high - low, 0), axis=2)
     area_a, area_b = (np.prod(np.maximum(one[:, 2:] - one[:, :2], 0), axis=1) for one in (a, b))
     union = area_a[:, None] + area_b[None] - shared
-    return np.divide(shared, union, out=np.zeros_like(shared, np.float64), where=union > 0)
+    return np.asarray(np.divide(shared, union, out=np.zeros_like(shared, np.float64), where=union > 0))

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
 from placegraph.runtime.errors import QueryError, SourceError
 from placegraph.runtime.geometry import box_iou
@@ -21,31 +20,14 @@ from placegraph.runtime.node import Context, build_node
 from placegraph.runtime.question import make_question
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.places import share
-from placegraph.tools.house.truth import TRUTH, Box
+from placegraph.tools.house.questions import AskedQuestion, from_json
+from placegraph.tools.house.truth import TRUTH
 from placegraph.tools.map_folder import RUN, find_graph, read_config
 
 F64 = NDArray[np.float64]
 
 QUESTIONS = "questions.json"
 IOUS = (0.1, 0.25, 0.5, 0.75)  # paper, "Metrics" of object grounding
-
-
-def _point(value: object) -> F64:
-    array = np.array(value, np.float64)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise ValueError("expected three finite numbers")
-    return array
-
-
-@dataclass(frozen=True, eq=False)
-class HouseQuestion:
-    """What is needed of a question: its words, form, the target's box (2, 3) and where the asker stands, true world."""
-
-    __pydantic_config__ = ConfigDict(extra="ignore")
-    text: str
-    form: str
-    box: Box
-    viewpoint: Annotated[F64, PlainValidator(_point)] | None = None
 
 
 @dataclass(frozen=True)
@@ -58,19 +40,18 @@ class Reply:
     ms: float
 
 
-def read_questions(source: Path) -> tuple[HouseQuestion, ...] | None:
+def read_questions(source: Path) -> list[AskedQuestion] | None:
     """The questions of a house folder; None when it has none. Raises SourceError naming what is damaged."""
     file = source / TRUTH / QUESTIONS
     if not file.exists():
         return None
     try:
-        found: tuple[HouseQuestion, ...] = TypeAdapter(tuple[HouseQuestion, ...]).validate_json(file.read_bytes())
-    except OSError as error:
-        raise SourceError(f"{file}: cannot be read: {error.strerror}") from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise SourceError(f"{file}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}") from None
-    return found
+        values = json.loads(file.read_text("utf-8"))
+        if not isinstance(values, list):
+            raise SourceError("expected a list of questions")
+        return from_json(values)
+    except (OSError, ValueError, SourceError) as error:
+        raise SourceError(f"{file}: {error}") from None
 
 
 class StoredGraph:
@@ -108,7 +89,7 @@ class StoredGraph:
         return Reply(reply["status"], reply["object_id"] or "", reply["llm_calls"], ms)
 
 
-def ask_all(folder: Path, questions: Sequence[HouseQuestion], true_from_map: F64) -> list[Reply]:
+def ask_all(folder: Path, questions: Sequence[AskedQuestion], true_from_map: F64) -> list[Reply]:
     """The map's reply to each question; true_from_map (4, 4) moves the map onto the truth."""
     replies = []
     with StoredGraph(folder) as graph:
@@ -121,7 +102,7 @@ def ask_all(folder: Path, questions: Sequence[HouseQuestion], true_from_map: F64
 
 
 def grounding_scores(
-    questions: Sequence[HouseQuestion], replies: Sequence[Reply], boxes: dict[str, F64]
+    questions: Sequence[AskedQuestion], replies: Sequence[Reply], boxes: dict[str, F64]
 ) -> dict[str, Any]:
     """Scores in all and by form; `boxes` are the map objects' (2, 3) by id, in the frame of the questions."""
     ious = []

@@ -81,7 +81,7 @@ def text(scores: dict[str, Any], per_class: bool) -> str:
         f"detector   AP50 {number(scores['detector_ap50'])} by name over {scores['detector_classes']} classes, "
         f"{synonyms}",
         f"           without cut objects; with them {number(scores['detector_ap50_with_cut'])}; of "
-        f"{scores['objects']} objects {scores['small']} are too small to count, {scores['cut']} others cut by the border",
+        f"{scores['objects']} objects {scores['small']} are too small to count, {scores['cut']} others are cut",
         f"segmenter  mIoU {number(scores['segmenter_miou'])} over {scores['masks']} objects",
     ]
     for threads, times in scores["ms"].items():

@@ -112,7 +112,7 @@ def compare(found: Sequence[MapObject], true: Sequence[TrueObject]) -> Pairing:
 def fits(pairing: Pairing, true_boxes: F64) -> Bools:
     """(map, true) which map objects fit which true boxes (T, 2, 3)."""
     thin = (true_boxes[:, 1] - true_boxes[:, 0]).min(axis=1) < THIN_M
-    return pairing.named & ((pairing.iou >= LEAST_IOU) | (thin[None] & (pairing.apart_m < NEAR_M)))
+    return np.asarray(pairing.named & ((pairing.iou >= LEAST_IOU) | (thin[None] & (pairing.apart_m < NEAR_M))))
 
 
 def pair(pairing: Pairing, allowed: Bools) -> dict[int, int]:

@@ -111,12 +111,14 @@ def f1_curve(iou: F64, deltas: Sequence[float] = DELTAS) -> dict[float, float]:
 def match_floors(found: F64, true: F64) -> list[tuple[int, int, float]]:
     """Pairs (found, true, error) of floors given by their lowest and highest height (F, 2), (T, 2) in metres.
 
-    The error is that of the worse boundary; the best pair first, each floor once.
+    Floors whose surfaces are nearest come first, each floor once: two floors taken for one are the lower of them. The
+    error is that of the worse boundary.
     """
-    error = np.abs(found[:, None] - true[None]).max(axis=2)
+    error = np.abs(found[:, None] - true[None])
+    free = error[..., 0].copy()
     pairs = []
-    for _ in range(min(error.shape)):
-        i, j = (int(k) for k in np.unravel_index(error.argmin(), error.shape))
-        pairs.append((i, j, float(error[i, j])))
-        error[i], error[:, j] = np.inf, np.inf
+    for _ in range(min(free.shape)):
+        i, j = (int(k) for k in np.unravel_index(free.argmin(), free.shape))
+        pairs.append((i, j, float(error[i, j].max())))
+        free[i], free[:, j] = np.inf, np.inf
     return pairs

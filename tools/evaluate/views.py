@@ -100,5 +100,5 @@ def evaluation_view(
         classes=rows[:, 1].astype(np.int64),
         boxes=boxes,
         small=rows[:, 6] < LEAST_SHARE * height * width,
-        cut=((boxes[:, :2] <= 0) | (boxes[:, 2:] >= (width, height))).any(axis=1),
+        cut=np.asarray(((boxes[:, :2] <= 0) | (boxes[:, 2:] >= (width, height))).any(axis=1)),
     )

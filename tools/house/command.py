@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Annotated
 
@@ -21,11 +22,12 @@ def house(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes (default: one for each core); the result is the same.")
     ] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace another house folder at --out.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
 ) -> None:
     """Make a house and film it; `placegraph run CONFIG --source OUT` maps it."""
     order = HouseOrder(seed, floors, limit, width, width * 3 // 4)
-    made = _already_there(out, order)
+    made = _already_there(out, order, replace)
     run = made or export(order, out, workers, quiet)
     size = f"{run.width}x{run.height}"
     print(f"\n{'it is there already' if made else 'written'}  {out}: {run.frames} frames of {size}, seed {run.seed}")
@@ -33,12 +35,18 @@ def house(
     print(f"map it   placegraph run configs/demo.toml --source {out}")
 
 
-def _already_there(out: Path, order: HouseOrder) -> HouseRun | None:
-    """What made the folder when it is just what is asked for; None when there is nothing; raises ConfigError else."""
+def _already_there(out: Path, order: HouseOrder, replace: bool) -> HouseRun | None:
+    """What made the folder when it is just what is asked for; None when there is nothing; raises ConfigError else.
+
+    `replace`: another house folder, whole or not, is removed; anything else never is.
+    """
     if out.is_dir() and any(out.iterdir()):
         run = read_house_run(out)
         if run is None:
             raise ConfigError(f"{out}: exists and is not a house folder; choose another --out or remove it")
+        if not order.is_made_by(run) and replace:
+            shutil.rmtree(out)
+            return None
         if not order.is_made_by(run):
             raise ConfigError(
                 f"{out}: holds another house (seed {run.seed}, limit {run.limit}, {run.width}x{run.height}, generator "

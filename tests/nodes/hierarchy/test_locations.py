@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from placegraph.models_onnx import ScoredMasks
 from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
+from placegraph.runtime.errors import ConfigError
 
 SPAN = FloorSpan(0.0, 2.5, 0.0, 2.5)
 
@@ -57,3 +59,54 @@ def test_small_and_elongated_areas_go():
 
 def test_objects_without_points_in_the_band():
     assert find(block(0, 0, z=(2.2, 2.5)), block(0.5, 0, z=(2.2, 2.5))) == []
+
+
+class Drawn:
+    """A detector whose masks are given: rectangles x0 y0 x1 y1 in metres from the middle of the image."""
+
+    def __init__(self, *found):
+        self.found = found
+
+    def locate(self, image):
+        masks = []
+        for (x0, y0, x1, y1), _ in self.found:
+            mask = np.zeros(image.shape[:2], bool)
+            middle = len(mask) // 2
+            rows, columns = (slice(middle + round(a / 0.05), middle + round(b / 0.05)) for a, b in ((y0, y1), (x0, x1)))
+            mask[rows, columns] = True
+            masks.append(mask)
+        return ScoredMasks(masks, np.array([score for _, score in self.found], np.float32))
+
+
+def detect(found, *objects, **changes):
+    return find_locations(objects, SPAN, LocationConfig(model="net", **changes), Drawn(*found))
+
+
+PAIRS = (block(-2.25, -0.25), block(-1.5, -0.25), block(1.0, -0.25), block(1.75, -0.25))  # their middle is the origin
+
+
+def test_objects_mostly_inside_a_mask_are_its_members():
+    areas = detect([((0.8, -0.5, 2.6, 0.5), 0.9), ((-2.4, -0.5, -0.9, 0.5), 0.8)], *PAIRS)
+    assert [area.members for area in areas] == [(0, 1), (2, 3)]
+    assert areas[0].outline.min(axis=0) == pytest.approx((-2.25, -0.25), abs=0.06)
+    assert areas[0].outline.max(axis=0) == pytest.approx((-1.05, 0.2), abs=0.06)
+
+
+def test_an_object_belongs_to_the_better_of_two_masks():
+    areas = detect([((0.8, -0.5, 2.6, 0.5), 0.9), ((-2.6, -0.5, 2.6, 0.5), 0.8)], *PAIRS)
+    assert [area.members for area in areas] == [(0, 1), (2, 3)]
+
+
+def test_uncertain_masks_and_masks_without_enough_objects_are_none():
+    assert detect([((0.8, -0.5, 2.6, 0.5), 0.1)], *PAIRS, min_score=0.2) == []
+    assert detect([((0.8, -0.5, 1.6, 0.5), 0.9)], *PAIRS, least_objects=2) == []
+    assert detect([((0.8, 2.0, 1.6, 2.5), 0.9)], *PAIRS) == []
+
+
+def test_no_objects_need_no_network():
+    assert detect([((0, 0, 1, 1), 0.9)]) == []
+
+
+def test_a_model_that_was_not_loaded_is_an_error():
+    with pytest.raises(ConfigError, match="'net'"):
+        find_locations([block(0, 0)], SPAN, LocationConfig(model="net"))

@@ -117,6 +117,14 @@ class Naming:
     unsaid: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Mention:
+    """An item and the words that it is told by."""
+
+    id: int
+    naming: Naming
+
+
 @cache
 def kin_of(word: str, class_name: str) -> Kin:
     """The names of all classes that a listener may take a word of a class for."""

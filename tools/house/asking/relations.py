@@ -35,7 +35,7 @@ def only(answers: Answers, mask: Mask) -> int | None:
 def relations(scene: Scene) -> dict[str, Answers]:
     """(N, N) answers of the relations that need no viewer, by name: on, under, above, below, next to, near."""
     above = _above(scene)
-    return {
+    tables = {
         "on": _on(scene),
         "under": _under(scene),
         "above": above,
@@ -43,6 +43,9 @@ def relations(scene: Scene) -> dict[str, Answers]:
         "next to": _beside(scene, NEXT_TO_M, NOT_NEXT_TO_M),
         "near": _beside(scene, NEAR_M, NOT_NEAR_M),
     }
+    for table in tables.values():
+        np.fill_diagonal(table, NO)
+    return tables
 
 
 def _share_over(scene: Scene) -> F64:
@@ -70,7 +73,9 @@ def _under(scene: Scene) -> Answers:
     share, lower = _share_over(scene), scene.high[:, None, 2] < scene.high[None, :, 2] - 0.02
     floored = (scene.support[:, None] == ON_FLOOR) & (scene.support[None] == ON_FLOOR)
     roofs = np.array([name in TABLES for name in scene.names], bool)[None]
-    return graded((share > 0.6) & lower & floored & roofs, (share > 0.05) & (scene.low[:, None, 2] < scene.high[None, :, 2]))
+    return graded(
+        (share > 0.6) & lower & floored & roofs, (share > 0.05) & (scene.low[:, None, 2] < scene.high[None, :, 2])
+    )
 
 
 def _above(scene: Scene) -> Answers:
@@ -89,9 +94,8 @@ def _beside(scene: Scene, yes_m: float, no_m: float) -> Answers:
     level = scene.axis_gap[..., 2] < 0
     resting = _resting(scene)
     apart = ~(resting | resting.T) & (_share_over(scene) < 0.25) & (_share_over(scene).T < 0.25)
-    self_free = ~np.eye(scene.count, dtype=bool)
     yes = scene.same_room & level & apart & (scene.gap <= yes_m)
-    return graded(yes, scene.same_floor & self_free & (scene.gap <= no_m))
+    return graded(yes, scene.same_floor & (scene.gap <= no_m))
 
 
 def between(scene: Scene, a: int, b: int) -> Answers:
@@ -112,7 +116,7 @@ def between(scene: Scene, a: int, b: int) -> Answers:
 
 
 def closest(scene: Scene, anchor: int, mask: Mask) -> int | None:
-    """The item of the mask that is nearest to the anchor by surfaces and by middles, with a lead; None without one."""
+    """The item of the mask that is nearest to the anchor by surfaces and by middles, with a lead, or None."""
     ids = np.flatnonzero(mask)
     if len(ids) < 2:
         return None
@@ -123,7 +127,7 @@ def closest(scene: Scene, anchor: int, mask: Mask) -> int | None:
 
 
 def farthest(scene: Scene, anchor: int, mask: Mask) -> int | None:
-    """The item of the mask that is farthest from the anchor by surfaces and by middles, with a lead; None without one."""
+    """The item of the mask that is farthest from the anchor by surfaces and by middles, with a lead, or None."""
     ids = np.flatnonzero(mask)
     if len(ids) < 2:
         return None

@@ -85,13 +85,21 @@ class Scene:
         names = np.array(self.names, dtype=str)
         return {name: names == name for name in sorted(set(self.names))}
 
+    @cached_property
+    def _of_kin(self) -> dict[Kin, Mask]:
+        return {}
+
     def of(self, kin: Kin) -> Mask:
         """(N,) which items a word of these classes may mean."""
-        mask = np.zeros(self.count, bool)
-        for name in sorted(kin):
-            if name in self._of_class:
-                mask |= self._of_class[name]
-        return mask
+        if kin not in self._of_kin:
+            names = [name for name in sorted(kin) if name in self._of_class]
+            masks = [self._of_class[name] for name in names]
+            self._of_kin[kin] = np.logical_or.reduce([np.zeros(self.count, bool), *masks])
+        return self._of_kin[kin]
+
+    def has_twin(self, one: int, mask: Mask) -> bool:
+        """Whether a mask (N,) holds another item of one item's own class."""
+        return bool(np.count_nonzero(self._of_class[self.names[one]] & mask) > 1)
 
 
 def scene_of(house: House) -> Scene:

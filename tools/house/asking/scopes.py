@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.tools.house.asking.names import Kin
+from placegraph.tools.house.asking.names import Mention
 from placegraph.tools.house.asking.scene import Mask, Scene
 from placegraph.tools.house.model import Room
 
@@ -24,11 +24,10 @@ AREA_RATIO = 1.25  # a room is larger than another from here on
 
 @dataclass(frozen=True)
 class ScopeWords:
-    """One way to say a scope; `{}` in it is a word for the item `inside`, which is said as one of `kin`."""
+    """One way to say a scope; `{}` in it is a word for the item `inside`."""
 
     text: str
-    inside: int | None = None
-    kin: Kin = frozenset()
+    inside: Mention | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +41,7 @@ class Scope:
 
 
 def scopes(scene: Scene) -> tuple[Scope, ...]:
-    """All scopes that can be named: the house, its floors where there are several, its rooms where words tell them apart."""
+    """All scopes that can be named: the house, the floors of several, the rooms that words tell apart."""
     found = [Scope("house", np.ones(scene.count, bool), (ScopeWords(""),))]
     floors = len(scene.house.floors)
     for index in range(floors if floors > 1 else 0):
@@ -87,7 +86,11 @@ def _room_words(scene: Scene, room: Room) -> tuple[ScopeWords, ...]:
             words.append(ScopeWords(f"in the {'upstairs' if room.floor else 'downstairs'} {names[0]}"))
     elif floors > 1:
         ending = floor_words(room.floor, floors)
-        words += [ScopeWords(f"in the {adjective} {names[0]} {ending[0]}") for adjective in _size_words(room, floor_mates) if ending]
+        words += [
+            ScopeWords(f"in the {adjective} {names[0]} {ending[0]}")
+            for adjective in _size_words(room, floor_mates)
+            if ending
+        ]
     words += [ScopeWords(f"in the {adjective} {names[0]}") for adjective in _size_words(room, alike)]
     return tuple(words + _content_words(scene, room, alike, names[0]))
 
@@ -116,6 +119,6 @@ def _content_words(scene: Scene, room: Room, alike: list[Room], name: str) -> li
     for one in np.flatnonzero(scene.anchors & (scene.room == room.id)).tolist():
         for naming in scene.namings[one]:
             if scene.names[one] != "window" and np.flatnonzero(scene.of(naming.kin) & among).tolist() == [one]:
-                words.append(ScopeWords(f"in the {name} with the {{}}", one, naming.kin))
+                words.append(ScopeWords(f"in the {name} with the {{}}", Mention(one, naming)))
                 break
     return words

@@ -8,11 +8,11 @@ import numpy as np
 
 from placegraph.tools.house.asking.relations import Answers, graded
 from placegraph.tools.house.asking.scene import F64, Scene
-from placegraph.tools.house.model import House, Opening, Room, Wall
+from placegraph.tools.house.model import ON_CEILING, House, Opening, Room, Wall
 from placegraph.tools.house.space import PASSAGES, free_grid, inside
 
 EYE_M = 1.5  # above the floor
-PLACES = 6  # tried in a room
+PLACES = 3  # tried in a room
 AWAY_M, REACH_M = 0.8, 6.0  # from a standpoint to what is looked at
 CLEAR_M, BLUR_M = 0.35, 0.15  # YES from the one on, NO beyond the other on the far side
 CONE = 0.8  # largest share of sideways in forward, or forward in sideways
@@ -38,7 +38,10 @@ def standpoints(house: House, random: np.random.Generator) -> dict[int, tuple[St
             own = places[inside(room.polygon, places)]
             if not len(own):
                 continue
-            eyes = [_entrance(house, room, own), *[Standpoint(one) for one in own[random.integers(len(own), size=PLACES)]]]
+            eyes = [
+                _entrance(house, room, own),
+                *[Standpoint(one) for one in own[random.integers(len(own), size=PLACES)]],
+            ]
             found[room.id] = tuple(
                 Standpoint(np.append(one.eye, floor.z_m + EYE_M).round(3), one.door) for one in eyes if one is not None
             )
@@ -78,11 +81,13 @@ def viewed(scene: Scene, eye: F64, anchor: int) -> dict[str, Answers]:
     left, ahead = offset @ leftward, offset @ forward
     here = scene.same_room[:, anchor].copy()
     here[anchor] = False
+    # nobody says so of a lamp on the ceiling, or of a clock far above a bench
+    level = (scene.axis_gap[:, anchor, 2] < 0.3) & (scene.support != ON_CEILING)
     answers = {}
     for view, main, cross in (
         ("left", left, ahead), ("right", -left, ahead), ("front", -ahead, left), ("behind", ahead, left)
     ):  # fmt: skip
-        clear = (main >= CLEAR_M) & (np.abs(cross) <= CONE * main) & (scene.flat_gap[:, anchor] <= 2.0)
+        clear = level & (main >= CLEAR_M) & (np.abs(cross) <= CONE * main) & (scene.flat_gap[:, anchor] <= 2.0)
         answers[view] = graded(clear, here & (main > -BLUR_M))
     return answers
 
