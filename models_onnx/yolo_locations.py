@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from placegraph.models_onnx import U8, ScoredMasks
-from placegraph.models_onnx import yolo_seg
+from placegraph.models_onnx import U8, ScoredMasks, yolo_seg
 from placegraph.models_onnx.manifest import Weights
 from placegraph.runtime.errors import ModelError
 

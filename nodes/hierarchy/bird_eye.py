@@ -48,7 +48,9 @@ def bird_eye(objects: Sequence[Points], span: FloorSpan, band_high: float) -> tu
     levels = np.round(LEAST_LEVEL + (255 - LEAST_LEVEL) * share).astype(np.uint8)
     highest, lowest = np.zeros((2, SIZE_PX, SIZE_PX), np.uint8)
     np.maximum.at(highest, (rows, columns), levels)
-    np.maximum.at(lowest, (rows, columns), (255 - levels) + np.uint8(LEAST_LEVEL))  # bright: it reaches down to the floor
+    np.maximum.at(
+        lowest, (rows, columns), (255 - levels) + np.uint8(LEAST_LEVEL)
+    )  # bright: it reaches down to the floor
     image[..., 0], image[..., 1] = _filled(highest), _filled(lowest)
     image[..., 2] = _footprints(kept, grid)
     return image, grid
@@ -76,6 +78,6 @@ def _footprints(objects: list[Points], grid: Grid) -> U8:
         rows, columns = grid.cells(xyz)
         hull = cv2.convexHull(np.stack((columns, rows), axis=1).astype(np.int32))
         filled = cv2.fillConvexPoly(np.zeros(grid.shape, np.uint8), hull, 1)
-        levels += filled * np.uint16(FOOTPRINT_LEVEL)
+        levels += np.asarray(filled, np.uint16) * np.uint16(FOOTPRINT_LEVEL)
         cv2.polylines(edges, [hull], True, EDGE_LEVEL)
     return np.maximum(np.minimum(levels, 200).astype(np.uint8), edges)

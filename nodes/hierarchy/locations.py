@@ -80,7 +80,7 @@ def find_locations(
 def _detect(
     objects: Sequence[Points], span: FloorSpan, config: LocationConfig, detector: LocationDetector
 ) -> list[LocationArea]:
-    """Masks of the network in the order of their scores: each takes the objects mostly inside it that are still free."""
+    """Masks of the network, best first: each takes the objects mostly inside it that no better one has."""
     image, grid = bird_eye(objects, span, config.band_high)
     if not image.any():
         return []

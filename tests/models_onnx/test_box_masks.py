@@ -117,7 +117,9 @@ def test_the_mask_is_the_bright_part_of_the_box(build, height, width):
 
 def test_a_mask_is_exact_where_the_logits_are(build):
     """Left of the middle of the picture: a straight edge that bilinear logits place within a pixel, box after box."""
-    image = np.repeat(np.linspace(255, 102, 640).astype(np.uint8)[None, :, None], 480, 0).repeat(3, 2)  # .7 in the middle
+    image = np.repeat(np.linspace(255, 102, 640).astype(np.uint8)[None, :, None], 480, 0).repeat(
+        3, 2
+    )  # .7 in the middle
     boxes = [[0, 0, 640, 480], [300, 10, 360, 470], [310, 200, 340, 230], [200, 0, 600, 50], [0, 0, 400, 480]]
     masks = build().segment(image, no_depth(image), np.array(boxes, np.float32))
     for (x0, y0, x1, y1), mask in zip(boxes, masks, strict=True):

@@ -25,10 +25,13 @@ SALT = 6_011  # keeps the scans' randomness apart from what else is drawn from a
 STEP_M = 0.002  # points are stored as whole steps
 VOXEL_M = 0.025  # of the map's objects
 DENSITY_PER_M2 = 2500.0  # of the points drawn on surfaces: a voxel holds more than one
-DIRECTIONS = (288, 144)  # cells of a camera's sphere, in which the nearest surface hides what lies behind it
+DIRECTIONS = (160, 80)  # cells of a camera's sphere, in which the nearest surface hides what lies behind it
 THICK_M = 0.06  # what is so little behind the nearest surface of its direction is still seen
 FAR_M = 5.0  # a depth camera's reach
 NOISE_M = 0.008
+CLEAR_M = 0.25  # from a camera to furniture in plan
+CARPET_M = 0.1  # what is no higher is walked over
+CAMERA_TRIALS = 200
 LEAST_POINTS = 25  # fewer make no object
 PHANTOM = -2  # RoomScan.location of what is no object of the house
 
@@ -94,7 +97,7 @@ def _scan_room(house: House, room: Room, random: np.random.Generator) -> RoomSca
     items = [item for item in house.items if item.room == room.id]
     objects, where = [], []
     if items:
-        for item, xyz in zip(items, _seen(items, _cameras(room, floor.z_m, random), random), strict=True):
+        for item, xyz in zip(items, _seen(items, _cameras(room, items, floor.z_m, random), random), strict=True):
             if len(xyz) >= LEAST_POINTS:
                 objects.append(xyz)
                 where.append(number.get(item.location, -1))
@@ -104,18 +107,33 @@ def _scan_room(house: House, room: Room, random: np.random.Generator) -> RoomSca
     return RoomScan(room.floor, *span, rectangle, tuple(objects), tuple(where), outlines)
 
 
-def _cameras(room: Room, floor_m: float, random: np.random.Generator) -> list[tuple[F64, float, float]]:
-    """Places (3,) in a room at the height of a robot's mast or a hand, with the sector that each sees, radians."""
+def _cameras(
+    room: Room, items: list[PlacedItem], floor_m: float, random: np.random.Generator
+) -> list[tuple[F64, float, float]]:
+    """Places (3,) in a room, beside the furniture where it leaves room, at the height of a robot's mast or a hand, with
+    the heading and half the sector that each sees, radians.
+    """
     contour = room.polygon.astype(np.float32)
     low, high = room.polygon.min(axis=0), room.polygon.max(axis=0)
-    cameras = []
+    boxes = np.array([item.box for item in items if item.box[0, 2] < floor_m + CARPET_M < item.box[1, 2]])
+    edge_m = min(0.3, *((high - low) / 4))
+    cameras: list[tuple[F64, float, float]] = []
     wanted = int(random.integers(2, 6))
-    while len(cameras) < wanted:
-        x, y = random.uniform(low, high)
-        if cv2.pointPolygonTest(contour, (float(x), float(y)), True) > min(0.3, *((high - low) / 4)):
-            place = np.array([x, y, floor_m + random.uniform(0.9, 1.7)])
+    for trial in range(CAMERA_TRIALS):
+        xy = random.uniform(low, high)
+        free = not len(boxes) or not _within(xy, boxes)
+        tired = trial > CAMERA_TRIALS // 2  # a room full of furniture is looked at from above it
+        if cv2.pointPolygonTest(contour, tuple(xy.tolist()), True) > edge_m and (free or tired):
+            place = np.append(xy, floor_m + random.uniform(0.9, 1.7))
             cameras.append((place, random.uniform(-np.pi, np.pi), random.uniform(0.5, 1.2) * np.pi))
+        if len(cameras) == wanted:
+            break
     return cameras
+
+
+def _within(xy: F64, boxes: F64) -> bool:
+    """Whether a point (2,) is less than CLEAR_M from a box (N, 2, 3) in plan."""
+    return bool(((xy > boxes[:, 0, :2] - CLEAR_M) & (xy < boxes[:, 1, :2] + CLEAR_M)).all(axis=1).any())
 
 
 def _seen(items: list[PlacedItem], cameras: list[tuple[F64, float, float]], random: np.random.Generator) -> list[F32]:

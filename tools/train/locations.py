@@ -96,7 +96,7 @@ def turned(scan: RoomScan, random: np.random.Generator) -> RoomScan:
     shift = np.append(middle, 0).astype(np.float32)
     return replace(
         scan,
-        objects=tuple((xyz - shift) @ solid.T for xyz in scan.objects),
+        objects=tuple(np.asarray((xyz - shift) @ solid.T, np.float32) for xyz in scan.objects),
         outlines=tuple((xy - middle) @ flat.T for xy in scan.outlines),
     )
 

@@ -21,10 +21,10 @@ WORDS = 5
 
 
 def around(boxes):
-    """What all anchors find (A, 4): a plain guess of two strides around each centre, or `boxes` where they lie inside."""
+    """What all anchors find (A, 4): the box around them of `boxes`, else one stride to each side."""
     found = torch.cat((CENTRES - STRIDES[:, None], CENTRES + STRIDES[:, None]), 1)
     for box in boxes:
-        inside = (CENTRES > box[:2]).all(1) & (CENTRES < box[2:]).all(1)
+        inside = (box[:2] < CENTRES).all(1) & (box[2:] > CENTRES).all(1)
         found[inside] = box
     return found
 
@@ -87,7 +87,7 @@ def test_anchors_outside_answer_for_nothing():
 
 def test_a_contested_anchor_goes_to_the_box_of_higher_iou():
     boxes = torch.tensor([[0.0, 0, 40, 40], [14, 14, 54, 54]])
-    shared = (CENTRES > boxes[1, :2]).all(1) & (CENTRES < boxes[0, 2:]).all(1)
+    shared = (boxes[1, :2] < CENTRES).all(1) & (boxes[0, 2:] > CENTRES).all(1)
     found = around([])
     steps = torch.linspace(0.5, 13.5, int(shared.sum()))  # from near the first to near the second
     found[shared] = boxes[0] + steps[:, None]
@@ -126,8 +126,15 @@ def test_perfect_outputs_cost_nothing():
     cells[0, 1:3, 1:3], cells[0, 3:7, 5:7] = 1, 4
     tags = torch.zeros(1, WORDS)
     tags[0, prompts] = 1
-    cost = losses(perfect(boxes, prompts, cells.flatten(1)), targets(boxes.tolist(), prompts, None, cells.flatten(1), tags), SIZE, SIZE)
-    assert {name: float(value) < 0.01 for name, value in cost.items()} == dict.fromkeys(("box", "class", "dense", "tag"), True)
+    cost = losses(
+        perfect(boxes, prompts, cells.flatten(1)),
+        targets(boxes.tolist(), prompts, None, cells.flatten(1), tags),
+        SIZE,
+        SIZE,
+    )
+    assert {name: float(value) < 0.01 for name, value in cost.items()} == dict.fromkeys(
+        ("box", "class", "dense", "tag"), True
+    )
 
 
 def test_each_fault_shows_in_its_own_loss():
@@ -189,17 +196,24 @@ def test_an_image_without_objects_has_finite_losses_and_gradients():
 
 
 def test_extreme_outputs_have_finite_gradients():
-    out = tuple((torch.randn(part.shape, generator=torch.Generator().manual_seed(1)) * 40).requires_grad_() for part in outputs())
+    out = tuple(
+        (torch.randn(part.shape, generator=torch.Generator().manual_seed(1)) * 40).requires_grad_()
+        for part in outputs()
+    )
     cells = torch.full((1, 64), -1)
     cells[0, 5] = 3
     tags = torch.full((1, WORDS), torch.nan)
-    sum(losses(out, targets([[4, 4, 5, 60], [0, 0, 64, 64]], [3, 1], None, cells, tags), SIZE, SIZE).values()).backward()
+    sum(
+        losses(out, targets([[4, 4, 5, 60], [0, 0, 64, 64]], [3, 1], None, cells, tags), SIZE, SIZE).values()
+    ).backward()
     assert all(torch.isfinite(part.grad).all() for part in out)
 
 
 def test_images_of_a_batch_do_not_mix():
     a, b = targets([[4, 4, 28, 28]], [1]), targets()
-    both = Targets(a.boxes + b.boxes, a.prompts + b.prompts, a.counts + b.counts, a.cells.repeat(2, 1), a.tags.repeat(2, 1))
+    both = Targets(
+        a.boxes + b.boxes, a.prompts + b.prompts, a.counts + b.counts, a.cells.repeat(2, 1), a.tags.repeat(2, 1)
+    )
     out = tuple(part.detach().repeat(2, 1, 1).requires_grad_() for part in outputs())
     losses(out, both, SIZE, SIZE)["box"].backward()
     assert out[0].grad[0].abs().sum() > 0 and (out[0].grad[1] == 0).all()

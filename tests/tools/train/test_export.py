@@ -66,7 +66,9 @@ def conv_weights_in_float(file):
     """Names of convolutions whose weights are not dequantised from INT8."""
     graph = onnx.load(file).graph
     made = {name: node.op_type for node in graph.node for name in node.output}
-    return [node.name for node in graph.node if node.op_type == "Conv" and made.get(node.input[1]) != "DequantizeLinear"]
+    return [
+        node.name for node in graph.node if node.op_type == "Conv" and made.get(node.input[1]) != "DequantizeLinear"
+    ]
 
 
 def test_an_image_as_fed():
@@ -87,7 +89,10 @@ def test_the_float_file_equals_the_network(network, float_file):
 
 def test_names_and_shapes_are_those_asked_for(float_file):
     session = onnxruntime.InferenceSession(str(float_file), providers=["CPUExecutionProvider"])
-    assert [(one.name, one.shape) for one in session.get_inputs()] == [("images", [1, 3, 32, 32]), ("text", [1, "N", 8])]
+    assert [(one.name, one.shape) for one in session.get_inputs()] == [
+        ("images", [1, 3, 32, 32]),
+        ("text", [1, "N", 8]),
+    ]
     assert [one.name for one in session.get_outputs()] == ["scores"]
     assert session.get_outputs()[0].shape[1] == "N"
 

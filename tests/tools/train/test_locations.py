@@ -72,6 +72,7 @@ def test_the_losses_fall_and_bear_images_without_locations():
     assert float(losses(network(batch), [empty, empty], SIZE_PX)["mask"]) == 0
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_the_export_is_read_by_the_family_and_gives_what_the_network_gives(tmp_path):
     torch.manual_seed(0)
     network = LocationNetwork().eval()

@@ -85,7 +85,7 @@ def test_what_is_finished_is_only_read(tmp_path):
     again, seen = run(make_network(), tmp_path / "net.pt", steps=5)
     assert seen == []
     assert_equal(average, again)
-    more, seen = run(make_network(), tmp_path / "net.pt", steps=7)
+    _, seen = run(make_network(), tmp_path / "net.pt", steps=7)
     assert seen == [5, 6]
 
 

@@ -158,7 +158,11 @@ def test_boxes_of_a_batch_are_decoded_with_their_own_image():
     torch.manual_seed(0)
     network = MaskNetwork().eval()
     image, depth = torch.rand(3, 3, 64, 64), torch.rand(3, 1, 64, 64)
-    boxes = [torch.tensor([[0.1, 0.1, 0.6, 0.6]]), torch.zeros(0, 4), torch.tensor([[0.1, 0.1, 0.6, 0.6], [0, 0, 1, 1.0]])]
+    boxes = [
+        torch.tensor([[0.1, 0.1, 0.6, 0.6]]),
+        torch.zeros(0, 4),
+        torch.tensor([[0.1, 0.1, 0.6, 0.6], [0, 0, 1, 1.0]]),
+    ]
     with torch.no_grad():
         logits, quality = network(image, depth, boxes)
         assert logits.shape == (3, 1, G, G) and quality.shape == (3, 1)

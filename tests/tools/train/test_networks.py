@@ -142,7 +142,11 @@ def test_tagger_undoes_the_normalisation_and_pools_its_cells(network):
         tagger.shift.copy_(torch.linspace(-1, 1, 5))
         cells = network(image, text[None].expand(2, -1, -1))[2]
         wanted = torch.linspace(0.5, 2, 5) * torch.logsumexp(cells, 2) + torch.linspace(-1, 1, 5)
+        entered = []
+        hook = network.backbone.register_forward_pre_hook(lambda _, given: entered.append(given[0]))
         found = tagger(normal)
+        hook.remove()
+    torch.testing.assert_close(entered[0], image)  # an untrained network's logits hardly depend on its input
     assert found.shape == (2, 5)
     torch.testing.assert_close(found, wanted, atol=1e-3, rtol=1e-3)
 

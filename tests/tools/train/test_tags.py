@@ -20,7 +20,8 @@ torch.set_num_threads(1)
 def make_sample(classes, counts):
     n = len(classes)
     return Sample(
-        np.zeros((8, 8, 3), np.uint8), np.zeros((n, 4), np.float32), np.array(classes, np.int64), np.array(counts, bool),
+        np.zeros((8, 8, 3), np.uint8), np.zeros((n, 4), np.float32), np.array(classes, np.int64),
+        np.array(counts, bool),
         np.arange(n), np.zeros((8, 8), np.uint16), np.zeros((8, 8), np.float32), np.array([-1]),
     )  # fmt: skip
 

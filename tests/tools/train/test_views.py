@@ -67,7 +67,8 @@ def tiny_house(seed: int) -> House:
     square = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
     white = Material((230, 230, 230))
     walls: tuple[Part, ...] = (
-        box((0, 0, -0.1), (4, 4, 0), white), box((-0.1, 0, 0), (0, 4, 2.5), white), box((4, 0, 0), (4.1, 4, 2.5), white),
+        box((0, 0, -0.1), (4, 4, 0), white),
+        box((-0.1, 0, 0), (0, 4, 2.5), white), box((4, 0, 0), (4.1, 4, 2.5), white),
         box((0, -0.1, 0), (4, 0, 2.5), white), box((0, 4, 0), (4, 4.1, 2.5), white),
     )  # fmt: skip
     places = (("chair", 0.7, 0.7, 0.0), ("sofa", 3.2, 2.0, 0.0), ("cup", 3.2, 2.0, 0.8))
@@ -104,6 +105,8 @@ def test_a_shard_holds_what_it_says_and_is_read_back(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("small")
 def test_same_seed_same_bytes(tmp_path: Path) -> None:
+    for name in "abc":
+        (tmp_path / name).mkdir()
     one, same = render_house(20003, 3, tmp_path / "a"), render_house(20003, 3, tmp_path / "b")
     other = render_house(20004, 3, tmp_path / "c")
     names = sorted(path.name for path in one.iterdir())

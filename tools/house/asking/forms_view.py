@@ -95,18 +95,20 @@ def ordinal_requests(scene: Scene, scope: Scope, stands: dict[int, tuple[Standpo
             room = scene.house.rooms[scope.room]
             if row is None or not all(in_sight(room, stand.eye, scene.center[one]) for one in ids):
                 continue
+            pure = len({scene.names[one] for one in ids}) == 1
             for place, one in enumerate(row):
                 for naming in scene.namings[one]:
-                    if naming.kin == kin and scene.askable[one]:
-                        yield from _counted(scope, Mention(one, naming), place, len(row), stand)
+                    if naming.kin == kin and scene.askable[one] and scene.has_twin(one, scope.mask):
+                        yield from _counted(scope, Mention(one, naming), place, len(row), pure, stand)
 
 
-def _counted(scope: Scope, target: Mention, place: int, count: int, stand: Standpoint) -> Iterator[Request]:
+def _counted(scope: Scope, target: Mention, place: int, row: int, pure: bool, stand: Standpoint) -> Iterator[Request]:
+    """Words for a place in a row of so many; of mixed classes only the ends are the same for every listener."""
     tail = f"as seen from the {stand.door}" if stand.door else "from where I stand"
-    for index, end in ((place, "left"), (count - 1 - place, "right")):
+    for index, end in ((place, "left"), (row - 1 - place, "right")):
         if index == 0:
             yield Request("ordinal", target, scope, f"{end}most", (tail,), (), stand.eye)
-        elif index < len(COUNTED) and count > 2:
+        elif pure and index < len(COUNTED) and row > 2:
             yield Request("ordinal", target, scope, COUNTED[index], (f"from the {end} {tail}",), (), stand.eye)
-    if count == 3 and place == 1:
+    if pure and row == 3 and place == 1:
         yield Request("ordinal", target, scope, "middle", (tail,), (), stand.eye)

@@ -10,7 +10,7 @@ from placegraph.tools.house.asking.names import PLURAL, Naming
 from placegraph.tools.house.asking.request import Request
 from placegraph.tools.house.asking.scopes import ScopeWords
 
-UNSAID_TARGET, UNSAID_ANCHOR = 0.3, 0.08  # how often a word is one that training never says
+UNSAID_TARGET, UNSAID_ANCHOR = 0.25, 0.06  # how often a word is one that training never says
 ORDERS = (
     "find {}", "show me {}", "take me to {}", "go to {}", "lead me to {}", "guide me to {}", "point out {}",
     "look for {}", "bring me to {}", "locate {}",
