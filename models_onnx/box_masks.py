@@ -1,9 +1,9 @@
 """Read our box-prompted segmenter: one pass of the encoder an image, one of the decoder for all of its boxes.
 
-The split is SAM's, the layout ours: encoder `images` (1, 3, H, W) RGB 0..1, letterboxed in the middle with grey 114, and,
-in exports that take it, `depth` (1, 1, H, W) metres (0 = none), to `image_embeddings`; decoder `image_embeddings` and
-`boxes` (N, 4) x0 y0 x1 y1 as shares of the input, to `masks` (N, 1, G, G) logits and `iou_predictions` (N, 1). Departs
-from SAM: a mask's grid covers its box, grown by a margin, instead of the whole image, so small things keep their shape.
+The split is SAM's, the layout ours: encoder `images` (1, 3, H, W) RGB 0..1, letterboxed in the middle with grey 114,
+and, in exports that take it, `depth` (1, 1, H, W) metres (0 = none), to `image_embeddings`; decoder `image_embeddings`
+and `boxes` (N, 4) x0 y0 x1 y1 as shares of the input, to `masks` (N, 1, G, G) logits and `iou_predictions` (N, 1).
+Departs from SAM: a mask's grid covers its box, grown by a margin, not the whole image: small things keep their shape.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.yolo import prepare
+from placegraph.runtime.errors import ModelError
 
 
 class Options(ModelOptions):
@@ -39,6 +40,8 @@ class FAMILY:
         if self._takes_depth:
             inputs["depth"] = (1, 1, "H", "W")
         sizes = self._encoder.expect(inputs, {"image_embeddings": (1, "C", "h", "w")})
+        if sizes.keys() < set("HWChw"):
+            raise ModelError(f"{self._encoder.path}: every size but the number of boxes must be fixed")
         self._height, self._width = sizes["H"], sizes["W"]
         self._decoder.expect(
             {"image_embeddings": (1, sizes["C"], sizes["h"], sizes["w"]), "boxes": ("N", 4)},

@@ -4,7 +4,8 @@ Source: paper, location layer, by the recipe that made its training labels: DBSC
 the cluster with most of its points, clusters with few objects go, project, outline, drop small and elongated polygons.
 Departs: DBSCAN runs on coarse cells of the objects' points, room by room; the outline is that of the closed bird's-eye
 mask, which like an alpha shape may be concave. With a `model` its masks decide instead, as in the paper: the objects
-inside a mask are its members, and the outline is drawn around them (departs: mostly inside, since masks are coarse).
+inside a mask are its members. Departs: mostly inside, since masks are coarse; the outline is the convex one of the mask
+and of the members that stand on the floor, since a mask also covers what belongs there and was not mapped.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     compactness: float = 0.25  # paper, C in 4 pi S / P^2 < C (value not stated); a 5:1 strip has .44
     close_m: float = 0.2  # departs: stands for the alpha of the alpha shape
     model: str = ""  # a LocationDetector of the manifest; "": the recipe above
-    min_score: float = Field(default=0.35, ge=0, le=1)  # of the model's masks
-    inside_share: float = Field(default=0.6, gt=0, le=1)  # of an object's points in a mask that make it a member
+    min_score: float = Field(default=0.15, ge=0, le=1)  # of the model's masks; chosen on 13 houses kept aside
+    inside_share: float = Field(default=0.5, gt=0, le=1)  # of an object's points in a mask that make it a member
     stand_m: float = 0.4  # an object that begins higher hangs or lies on another: it draws no outline
 
 
@@ -90,23 +91,20 @@ def _detect(
     free = {i for i, xyz in enumerate(banded) if len(xyz)}
     areas = []
     for mask, score in zip(found.masks, found.scores.tolist(), strict=True):
-        if score < config.min_score:
-            continue
         inside = [i for i in sorted(free) if mask[grid.cells(banded[i])].mean() >= config.inside_share]
-        outline = _around([banded[i] for i in inside], span, config)
-        if len(inside) >= config.least_objects and outline is not None:
+        if score < config.min_score or not inside:
+            continue
+        outline = _around(grid.outline(mask), [banded[i] for i in inside], span, config)
+        if cv2.contourArea(outline.astype(np.float32)) >= config.least_area_m2:
             free -= set(inside)
             areas.append(LocationArea(outline, tuple(inside)))
     return sorted(areas, key=lambda area: area.members[0])
 
 
-def _around(objects: list[Points], span: FloorSpan, config: LocationConfig) -> F64 | None:
-    """Convex outline (K, 2) of what stands on the floor, of all where nothing does; None where it is too small."""
-    standing = [xyz for xyz in objects if xyz[:, 2].min() <= span.low + config.stand_m]
-    if not objects:
-        return None
-    outline = np.asarray(convex_footprint(np.concatenate(standing or objects)), float)
-    return outline if cv2.contourArea(outline.astype(np.float32)) >= config.least_area_m2 else None
+def _around(mask_outline: F64, members: list[Points], span: FloorSpan, config: LocationConfig) -> F64:
+    """Convex outline (K, 2) of a mask's and of those members that stand on the floor."""
+    standing = [xyz[:, :2] for xyz in members if xyz[:, 2].min() <= span.low + config.stand_m]
+    return np.asarray(convex_footprint(np.concatenate([mask_outline, *standing])), float)
 
 
 def _recipe(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:

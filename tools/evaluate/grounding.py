@@ -21,12 +21,11 @@ from placegraph.runtime.question import make_question
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.places import share
 from placegraph.tools.house.questions import AskedQuestion, from_json
-from placegraph.tools.house.truth import TRUTH
+from placegraph.tools.house.truth import QUESTIONS, TRUTH
 from placegraph.tools.map_folder import RUN, find_graph, read_config
 
 F64 = NDArray[np.float64]
 
-QUESTIONS = "questions.json"
 IOUS = (0.1, 0.25, 0.5, 0.75)  # paper, "Metrics" of object grounding
 
 

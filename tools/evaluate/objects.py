@@ -29,8 +29,7 @@ from placegraph.tools.house.truth import Seen, TrueObject
 F64 = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-LEAST_FRAMES = 5  # seen well: in the picture in so many frames,
-LEAST_PX = 400  # and with so many pixels in one of them
+LEAST_FRAMES = 5  # seen well: clear in so many frames
 LEAST_IOU = 0.25
 STRICT_IOU = 0.5
 THIN_M = 0.12
@@ -56,7 +55,7 @@ def class_of_word() -> dict[str, str]:
 
 def seen_well(seen: Seen) -> bool:
     """Whether the walk showed an object well enough to ask for it."""
-    return seen.frames >= LEAST_FRAMES and seen.most_px >= LEAST_PX
+    return seen.clear_frames >= LEAST_FRAMES
 
 
 def object_scores(found: Sequence[MapObject], true: Sequence[TrueObject], seen: Sequence[Seen]) -> dict[str, Any]:

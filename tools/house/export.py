@@ -5,6 +5,7 @@ Source: the folder format that nodes/camera/tum.py reads.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -25,13 +26,17 @@ from rich.progress import track
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.geometry import quaternion_xyzw
 from placegraph.tools.house.build import HouseFrame, HouseFrames, generator_version
+from placegraph.tools.house.model import House
 from placegraph.tools.house.picture import draw
-from placegraph.tools.house.truth import TRUTH, HouseRun, Seen, truth_of, write_truth
+from placegraph.tools.house.questions import questions, to_json
+from placegraph.tools.house.truth import CLEAR_SHARE, QUESTIONS, TRUTH, HouseRun, Seen, truth_of, write_truth
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
 JPEG_QUALITY = 95
+QUESTION_COUNT = 60
+LEAST_CLEAR_FRAMES = 5  # of what is asked about
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,7 @@ def export(order: HouseOrder, out: Path, workers: int | None = None, quiet: bool
     with _written_whole(out) as folder:
         for name in ("rgb", "depth", f"{TRUTH}/instances"):
             (folder / name).mkdir(parents=True)
-        views = np.zeros((len(source.house.items), 2), np.int64)  # frames, most pixels
+        views = np.zeros((len(source.house.items), 2), np.int64)  # frames, clear frames
         for pixels in track(
             _frames(order, source, folder, workers or os.cpu_count() or 1),
             total=count,
@@ -71,12 +76,21 @@ def export(order: HouseOrder, out: Path, workers: int | None = None, quiet: bool
             disable=quiet,
         ):
             views[:, 0] += pixels > 0
-            views[:, 1] = np.maximum(views[:, 1], pixels)
+            views[:, 1] += pixels >= CLEAR_SHARE * order.width * order.height
         _write_lists(source, count, folder)
-        seen = tuple(Seen(id, frames, most) for id, (frames, most) in enumerate(views.tolist()))
+        seen = tuple(Seen(id, frames, clear) for id, (frames, clear) in enumerate(views.tolist()))
         write_truth(truth_of(source.house, run, seen), folder)
+        _write_questions(source.house, seen, folder)
         _write_image(folder / "plan.png", draw(source.house, source.world_from_camera[:count, :3, 3])[..., ::-1])
     return run
+
+
+def _write_questions(house: House, seen: tuple[Seen, ...], folder: Path) -> None:
+    """Questions about what the walk showed clearly: target and anchors."""
+    shown = {one.id for one in seen if one.clear_frames >= LEAST_CLEAR_FRAMES}
+    asked = [one for one in questions(house, house.seed, 2 * QUESTION_COUNT) if {one.target, *one.anchors} <= shown]
+    text = json.dumps(to_json(asked[:QUESTION_COUNT]), sort_keys=True, ensure_ascii=False, indent=1)
+    (folder / TRUTH / QUESTIONS).write_text(text + "\n", encoding="utf-8")
 
 
 @contextmanager

@@ -41,7 +41,7 @@ class Material:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A closed or open triangle mesh of one material: vertices (V, 3) in metres, faces (F, 3) outward counterclockwise."""
+    """A triangle mesh of one material: vertices (V, 3) in metres, faces (F, 3) counterclockwise from outside."""
 
     vertices: F64
     faces: I32
@@ -175,7 +175,7 @@ class Floor:
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """A group of furniture that is used together: its kind, room, members (item ids) and outline (K, 2), world frame."""
+    """A group of furniture used together: its kind, room, members (item ids) and outline (K, 2), world frame."""
 
     id: int
     kind: str  # sleeping area, dining area, ...

@@ -34,7 +34,9 @@ def block(center: Point, size: Point, material: Material) -> Part:
     return box((x - w / 2, y - d / 2, z), (x + w / 2, y + d / 2, z + h), material)
 
 
-def lathe(profile: Sequence[tuple[float, float]], material: Material, center: Point = (0, 0, 0), sides: int = 16) -> Part:
+def lathe(
+    profile: Sequence[tuple[float, float]], material: Material, center: Point = (0, 0, 0), sides: int = 16
+) -> Part:
     """A solid of revolution about z: profile of (radius, height) from bottom to top; a radius of 0 closes an end."""
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     rings = np.array([[(r * np.cos(a), r * np.sin(a), z) for a in angles] for r, z in profile])
@@ -50,7 +52,12 @@ def lathe(profile: Sequence[tuple[float, float]], material: Material, center: Po
 
 
 def cylinder(
-    center: Point, radius_m: float, height_m: float, material: Material, top_radius_m: float | None = None, sides: int = 16
+    center: Point,
+    radius_m: float,
+    height_m: float,
+    material: Material,
+    top_radius_m: float | None = None,
+    sides: int = 16,
 ) -> Part:
     """An upright closed cylinder, or frustum, standing on `center`."""
     top = radius_m if top_radius_m is None else top_radius_m
@@ -60,7 +67,9 @@ def cylinder(
 def ellipsoid(center: Point, radii: Point, material: Material, sides: int = 14) -> Part:
     """An ellipsoid around `center`."""
     steps = np.linspace(-np.pi / 2, np.pi / 2, max(sides // 2, 4) + 1)
-    profile = [(max(float(np.cos(t)), 0.0) if 0 < i < len(steps) - 1 else 0.0, float(np.sin(t))) for i, t in enumerate(steps)]
+    profile = [
+        (max(float(np.cos(t)), 0.0) if 0 < i < len(steps) - 1 else 0.0, float(np.sin(t))) for i, t in enumerate(steps)
+    ]
     part = lathe(profile, material, sides=sides)
     return Part(part.vertices * np.array(radii) + np.array(center), part.faces, material)
 

@@ -20,6 +20,8 @@ from placegraph.tools.house.model import House, Item, PlacedItem
 F64 = NDArray[np.float64]
 
 TRUTH = "truth"  # the folder beside rgb/ and depth/
+QUESTIONS = "questions.json"  # read and written by questions.py
+CLEAR_SHARE = 400 / (640 * 480)  # of the image: 20 x 20 px of 640 x 480
 _STRICT = ConfigDict(strict=True, extra="forbid")
 _AS_LISTS = PlainSerializer(lambda array: array.tolist())
 
@@ -124,12 +126,12 @@ class TrueLocation:
 
 @dataclass(frozen=True)
 class Seen:
-    """How often an object is in the picture, and how large at most."""
+    """In how many frames an object is in the picture, and in how many clearly: with `CLEAR_SHARE` of it or more."""
 
     __pydantic_config__ = _STRICT
     id: int  # of the object
     frames: int
-    most_px: int  # in one frame
+    clear_frames: int
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,8 @@ BOX_WEIGHT, CLASS_WEIGHT, DENSE_WEIGHT, TAG_WEIGHT = 5.0, 0.5, 1.0, 0.05
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What a batch shows: boxes (M, 4), prompt of each (M,), whether it counts (M,), a list an image; cells (B, A8) hold
-    the prompt of each stride-8 cell, -1 for none; tags (B, N) 1 shown, 0 not, nan too little to count.
+    """What a batch shows: boxes (M, 4), prompt of each (M,), whether it counts (M,), a list an image; cells (B, A8):
+    the prompt of each stride-8 cell, -1 for none; tags (B, N): 1 shown, 0 not, nan too little to count.
     """
 
     boxes: list[Tensor]
@@ -56,7 +56,7 @@ def losses(outputs: tuple[Tensor, Tensor, Tensor], targets: Targets, height: int
     centres, strides = anchors(height, width)
     reach = functional.softplus(distances) * strides
     found = torch.cat((centres.T - reach[:, :2], centres.T + reach[:, 2:]), 1).transpose(1, 2)  # (B, A, 4)
-    scores = torch.sigmoid(logits).transpose(1, 2)  # (B, A, N)
+    scores = torch.sigmoid(logits.detach())  # (B, N, A)
     wanted = torch.zeros_like(scores)
     weight = torch.ones_like(scores)
     box_loss = torch.zeros(())
@@ -67,19 +67,19 @@ def losses(outputs: tuple[Tensor, Tensor, Tensor], targets: Targets, height: int
         boxes, prompts = boxes[counts], prompts[counts]
         if not len(boxes):
             continue
-        owner, quality = assign(found[k].detach(), scores[k].detach(), boxes, prompts, centres)
+        owner, quality = assign(found[k].detach(), scores[k], boxes, prompts, centres)
         mine = torch.nonzero(owner >= 0)[:, 0]
         if not len(mine):
             continue
-        wanted[k, mine, prompts[owner[mine]]] = quality[mine]
-        weight[k, mine] = 1.0
+        wanted[k, prompts[owner[mine]], mine] = quality[mine]
+        weight[k, prompts[owner[mine]], mine] = 1.0
         box_loss = box_loss + ((1 - ciou(found[k, mine], boxes[owner[mine]])) * quality[mine]).sum()
         total = total + quality[mine].sum()
     total = torch.clamp(total, min=1.0)
-    class_loss = functional.binary_cross_entropy_with_logits(logits.transpose(1, 2), wanted, reduction="none")
+    class_loss = functional.binary_cross_entropy_with_logits(logits, wanted, weight, reduction="sum")
     return {
         "box": BOX_WEIGHT * box_loss / total,
-        "class": CLASS_WEIGHT * (class_loss * weight).sum() / total,
+        "class": CLASS_WEIGHT * class_loss / total,
         "dense": DENSE_WEIGHT * _dense(dense, targets.cells),
         "tag": TAG_WEIGHT * _tags(dense, targets.tags),
     }
@@ -88,14 +88,14 @@ def losses(outputs: tuple[Tensor, Tensor, Tensor], targets: Targets, height: int
 def assign(found: Tensor, scores: Tensor, boxes: Tensor, prompts: Tensor, centres: Tensor) -> tuple[Tensor, Tensor]:
     """Which box each anchor answers for (A,), -1 for none, and the target score (A,).
 
-    found: (A, 4) px; scores: (A, N); boxes: (M, 4); prompts: (M,); centres: (A, 2).
+    found: (A, 4) px; scores: (N, A); boxes: (M, 4); prompts: (M,); centres: (A, 2).
     """
     overlap = iou(boxes, found)  # (M, A)
     inside = (centres[None] > boxes[:, None, :2]).all(-1) & (centres[None] < boxes[:, None, 2:]).all(-1)
     # a thing smaller than a cell may hold no cell centre: the nearest anchors stand in
     off = torch.cdist((boxes[:, :2] + boxes[:, 2:]) / 2, centres)
     inside |= off <= torch.sort(off, dim=1)[0][:, 2:3]
-    metric = scores[:, prompts].T ** SCORE_POWER * overlap**IOU_POWER * inside + 1e-9 * inside
+    metric = scores[prompts] ** SCORE_POWER * overlap**IOU_POWER * inside + 1e-9 * inside
     best = torch.topk(metric, TOP, dim=1)
     chosen = torch.zeros_like(metric, dtype=torch.bool).scatter_(1, best.indices, best.values > 0)
     contested = chosen.sum(0) > 1
@@ -115,7 +115,7 @@ def _ignore(weight: Tensor, boxes: Tensor, prompts: Tensor, centres: Tensor) -> 
     """Anchors inside an object that is too small or cut off are neither right nor wrong for its word."""
     for box, prompt in zip(boxes, prompts, strict=True):
         inside = ((centres > box[:2] - 8) & (centres < box[2:] + 8)).all(-1)
-        weight[inside, prompt] = 0.0
+        weight[prompt, inside] = 0.0
 
 
 def _dense(dense: Tensor, cells: Tensor) -> Tensor:

@@ -1,7 +1,7 @@
 """The paper's labelling recipe, and any other finder of locations, against the truth of houses: F1@delta.
 
-Source: paper, "Dataset Labeling" (the recipe is nodes/hierarchy/locations.py without a model) and its metric F1@delta:
-best pair first, a pair counts when its IoU exceeds delta, and each truth and each find is used once.
+Source: paper, "Dataset Labeling" (the recipe is nodes/hierarchy/locations.py without a model); the metric is that of
+tools/evaluate/places.py. Maps are simulated (location_maps.py), rooms are the true ones.
 """
 
 from __future__ import annotations
@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from placegraph.models_onnx import LocationDetector
 from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
+from placegraph.tools.evaluate.places import matched, overlaps
 from placegraph.tools.house.build import build
 from placegraph.tools.train.location_maps import RoomScan, degrade, scan_rooms
 
@@ -24,35 +25,16 @@ Finder = Callable[[RoomScan], list[F64]]  # a room to outlines (K, 2) in metres,
 
 EVALUATION_SEEDS = range(9000, 9020)
 DELTAS = (0.3, 0.5, 0.7)
-RASTER_M = 0.02
+SEEN_SHARE = 0.5  # of a location's members that must be in the map for it to count as seen
 SALT = 6_053  # of the mistakes made in the simulated maps
 
 
-@dataclass(frozen=True)
-class Count:
-    """Finds that are right, all finds, all truths; added up over rooms and houses."""
+@dataclass(frozen=True, eq=False)
+class MappedRoom:
+    """One room as it was mapped, and which of its true locations (scan.outlines) were seen."""
 
-    right: int = 0
-    found: int = 0
-    true: int = 0
-
-    def __add__(self, other: Count) -> Count:
-        return Count(self.right + other.right, self.found + other.found, self.true + other.true)
-
-    @property
-    def precision(self) -> float:
-        """Share of finds that are right, 0..1; 1 where nothing was found."""
-        return self.right / self.found if self.found else 1.0
-
-    @property
-    def recall(self) -> float:
-        """Share of truths that were found, 0..1; 1 where there is none."""
-        return self.right / self.true if self.true else 1.0
-
-    @property
-    def f1(self) -> float:
-        """Harmonic mean of both, 0..1."""
-        return 2 * self.right / (self.found + self.true) if self.found + self.true else 1.0
+    scan: RoomScan
+    seen: NDArray[np.bool_]  # (T,)
 
 
 def with_config(config: LocationConfig, detector: LocationDetector | None = None) -> Finder:
@@ -65,67 +47,47 @@ def with_config(config: LocationConfig, detector: LocationDetector | None = None
     return find
 
 
-def evaluation_rooms(seed: int) -> list[RoomScan]:
-    """The rooms of an evaluation house as one walk maps them, mistakes included."""
+def mapped_rooms(seed: int) -> list[MappedRoom]:
+    """The rooms of a house as one walk maps them, mistakes included."""
+    house = build(seed)
     random = np.random.default_rng([seed, SALT])
-    return [degrade(scan, random) for scan in scan_rooms(build(seed))]
+    rooms = []
+    for room, whole in zip(house.rooms, scan_rooms(house), strict=True):
+        scan = degrade(whole, random)
+        members = np.array([len(one.members) for one in house.locations if one.room == room.id])
+        mapped = np.bincount([where for where in scan.location if where >= 0], minlength=len(members))
+        rooms.append(MappedRoom(scan, (mapped > 0) & (mapped >= SEEN_SHARE * members)))
+    return rooms
 
 
-def count_house(rooms: Sequence[RoomScan], find: Finder, deltas: Sequence[float] = DELTAS) -> list[Count]:
-    """The counts of a house, one for each delta."""
-    totals = [Count() for _ in deltas]
-    for scan in rooms:
-        overlap = overlaps(find(scan), scan.outlines)
-        totals = [total + matched(overlap, delta) for total, delta in zip(totals, deltas, strict=True)]
-    return totals
-
-
-def overlaps(found: Sequence[F64], true: Sequence[F64]) -> F64:
-    """IoU (N, M) of outlines (K, 2), metres, on a common raster."""
-    result = np.zeros((len(found), len(true)))
-    if not result.size:
-        return result
-    every = np.concatenate([*found, *true])
-    low = every.min(axis=0)
-    columns, rows = (np.ceil((every.max(axis=0) - low) / RASTER_M).astype(int) + 1).tolist()
-
-    def raster(outline: F64) -> NDArray[np.bool_]:
-        pixels = np.round((outline - low) / RASTER_M).astype(np.int32)
-        return np.asarray(cv2.fillPoly(np.zeros((rows, columns), np.uint8), [pixels], 1) > 0)
-
-    masks = [raster(outline) for outline in true]
-    for i, outline in enumerate(found):
-        mine = raster(outline)
-        result[i] = [(mine & mask).sum() / (mine | mask).sum() for mask in masks]
-    return result
-
-
-def matched(overlap: F64, delta: float) -> Count:
-    """Greedy pairs of finds (N) and truths (M) by their IoU (N, M), best first, while it exceeds `delta`."""
-    left, right = overlap.copy(), 0
-    while left.size and left.max() > delta:
-        i, j = np.unravel_index(int(left.argmax()), left.shape)
-        left[i], left[:, j] = -1.0, -1.0
-        right += 1
-    return Count(right, *overlap.shape)
+def house_iou(rooms: Sequence[MappedRoom], find: Finder) -> F64:
+    """IoU (F, T) of all that was found in a house with all its true locations; 0 across rooms."""
+    found = [(number, outline) for number, room in enumerate(rooms) for outline in find(room.scan)]
+    true = [(number, outline) for number, room in enumerate(rooms) for outline in room.scan.outlines]
+    return overlaps(found, true).iou
 
 
 def comparison(
     finders: dict[str, Finder], seeds: Sequence[int] = EVALUATION_SEEDS, deltas: Sequence[float] = DELTAS
 ) -> str:
-    """A table: F1@.5 of each finder by house, then precision, recall and F1 over all houses at each delta."""
-    names = list(finders)
-    totals = {name: [Count() for _ in deltas] for name in names}
-    middle = deltas.index(0.5)
-    lines = ["house   truths  " + "  ".join(f"{name:>16}" for name in names)]
+    """A table: F1@.5 of each finder by house, then the scores over all houses, for all truths and for those seen."""
+    ious: dict[str, list[F64]] = {name: [] for name in finders}
+    seen: list[NDArray[np.bool_]] = []
+    lines = [_row("house", "truths", *finders)]
     for seed in seeds:
-        rooms = evaluation_rooms(seed)
-        counts = {name: count_house(rooms, finders[name], deltas) for name in names}
-        totals = {n: [a + b for a, b in zip(totals[n], counts[n], strict=True)] for n in names}
-        shown = "  ".join(f"{counts[name][middle].f1:16.3f}" for name in names)
-        lines.append(f"{seed:<7} {sum(len(scan.outlines) for scan in rooms):>6}  {shown}")
-    for k, delta in enumerate(deltas):
-        for what in ("precision", "recall", "f1"):
-            shown = "  ".join(f"{getattr(totals[name][k], what):16.3f}" for name in names)
-            lines.append(f"{what + '@' + format(delta, '.1f'):<14}  {shown}")
-    return "\n".join(lines)
+        rooms = mapped_rooms(seed)
+        seen.append(np.concatenate([room.seen for room in rooms]))
+        for name, find in finders.items():
+            ious[name].append(house_iou(rooms, find))
+        own = [f"{matched(ious[name][-1], 0.5).f1:.3f}" for name in finders]
+        lines.append(_row(str(seed), str(len(seen[-1])), *own))
+    for words, kept in (("all", np.ones(sum(map(len, seen)), bool)), ("seen", np.concatenate(seen))):
+        for delta in deltas:
+            scores = [matched(block_diag(*ious[name])[:, kept], delta) for name in finders]
+            listed = [f"{one.precision:.3f} {one.recall:.3f} {one.f1:.3f}" for one in scores]
+            lines.append(_row(f"{words} @{delta:g}", str(int(kept.sum())), *listed))
+    return "\n".join([*lines, "by house F1@.5; below precision, recall and F1"])
+
+
+def _row(first: str, second: str, *rest: str) -> str:
+    return f"{first:<9}{second:>7}" + "".join(f"{cell:>20}" for cell in rest)

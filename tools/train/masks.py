@@ -15,7 +15,7 @@ from placegraph.tools.train.networks import MaskDecoder, MaskEncoder
 from placegraph.tools.train.objects import LARGE, images_of
 from placegraph.tools.train.samples import Augment, Sample, batches, load_shards
 
-BATCH = 8
+BATCH = 4
 BOXES = 8  # of an image and step
 RATE = 2e-3
 BOX_JITTER = 0.06  # sigma of each side by the box's size: a detector's boxes are not exact
@@ -57,6 +57,7 @@ def ask(
         off = random.normal(0, BOX_JITTER, (len(chosen), 4)) * (random.random((len(chosen), 1)) < 0.7)
         asked = sample.boxes[chosen] + off * np.concatenate((size, size), 1)
         asked = np.clip(asked, 0, [width, height, width, height]).astype(np.float32)
+        asked[:, :2] = np.minimum(asked[:, :2], np.array([width, height]) - 2)
         asked[:, 2:] = np.maximum(asked[:, 2:], asked[:, :2] + 2)
         for box, item in zip(asked, sample.ids[chosen], strict=True):
             xs = np.clip(np.floor(box[0] + (box[2] - box[0]) * line), 0, width - 1).astype(int)

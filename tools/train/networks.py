@@ -76,20 +76,20 @@ class PooledPyramid(nn.Module):
 class Backbone(nn.Module):
     """Image (B, 3, H, W), 0..1, to features at strides 8, 16, 32 after a top-down and a bottom-up path."""
 
-    WIDTHS = (80, 96, 128)
+    WIDTHS = (64, 80, 112)
 
     def __init__(self) -> None:
         super().__init__()
-        self.stem = nn.Sequential(Conv(3, 16, 3, 2), Conv(16, 40, 3, 2), Csp(40, 40, 1))
-        self.to8 = nn.Sequential(Conv(40, 80, 3, 2), Csp(80, 80, 2))
-        self.to16 = nn.Sequential(Conv(80, 128, 3, 2), Csp(128, 128, 2))
-        self.to32 = nn.Sequential(Conv(128, 192, 3, 2), Csp(192, 192, 1), PooledPyramid(192))
-        self.down16 = Csp(192 + 128, 96, 1)
-        self.down8 = Csp(96 + 80, 80, 1)
-        self.up16 = Conv(80, 80, 3, 2)
-        self.join16 = Csp(80 + 96, 96, 1)
-        self.up32 = Conv(96, 96, 3, 2)
-        self.join32 = Csp(96 + 192, 128, 1)
+        self.stem = nn.Sequential(Conv(3, 16, 3, 2), Conv(16, 32, 3, 2), Csp(32, 32, 1))
+        self.to8 = nn.Sequential(Conv(32, 64, 3, 2), Csp(64, 64, 2))
+        self.to16 = nn.Sequential(Conv(64, 112, 3, 2), Csp(112, 112, 2))
+        self.to32 = nn.Sequential(Conv(112, 176, 3, 2), Csp(176, 176, 1), PooledPyramid(176))
+        self.down16 = Csp(176 + 112, 80, 1)
+        self.down8 = Csp(80 + 64, 64, 1)
+        self.up16 = Conv(64, 64, 3, 2)
+        self.join16 = Csp(64 + 80, 80, 1)
+        self.up32 = Conv(80, 80, 3, 2)
+        self.join32 = Csp(80 + 176, 112, 1)
 
     def forward(self, image: Tensor) -> list[Tensor]:
         """Features at each of STRIDES."""
@@ -143,9 +143,7 @@ class ObjectNetwork(nn.Module):
         super().__init__()
         self.backbone = Backbone()
         self.words = Words()
-        self.boxes = nn.ModuleList(
-            nn.Sequential(Conv(c, 64), Conv(64, 64), nn.Conv2d(64, 4, 1)) for c in Backbone.WIDTHS
-        )
+        self.boxes = nn.ModuleList(nn.Sequential(Conv(c, 64), nn.Conv2d(64, 4, 1)) for c in Backbone.WIDTHS)
         self.texts = nn.ModuleList(TextHead(c) for c in Backbone.WIDTHS)
         self.dense = TextHead(Backbone.WIDTHS[0])
 

@@ -1,4 +1,4 @@
-"""Everything trained to files: float and INT8 ONNX, the tagger's labels and thresholds, a manifest that names them."""
+"""Everything trained to files: float and INT8 ONNX, the tagger's labels and thresholds."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ KEEP_FLOAT = {
 
 
 def pack(work: Path, calibration: Path) -> Iterator[str]:
-    """Write WORK/onnx; says what was written. Raises ConfigError when a checkpoint is missing."""
+    """Write WORK/onnx: every network as float and INT8, the tags and their thresholds; says what was written.
+
+    Raises ConfigError when a checkpoint is missing.
+    """
     for name in ("objects.pt", "tags.pt", "masks.pt"):
         if not (work / name).exists():
             raise ConfigError(f"{work / name}: not trained yet: `placegraph train {name.removesuffix('.pt')}`")
@@ -59,7 +62,7 @@ def _both(float_file: Path, folder: Path, name: str, feeds: Iterator[Feeds], kee
     quantised = quantise(float_file, folder / f"{name}.onnx", feeds, keep)
     for file in (float_file, quantised):
         data = file.read_bytes()
-        yield f"{file.name}: size_bytes = {len(data)}, sha256 = {hashlib.sha256(data).hexdigest()}"
+        yield f"{file.relative_to(folder)}: size_bytes = {len(data)}, sha256 = {hashlib.sha256(data).hexdigest()}"
 
 
 def _views(calibration: Path, height: int, width: int, squash: bool) -> list[Sample]:

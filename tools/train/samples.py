@@ -87,9 +87,14 @@ class Augment:
         shard = self._shards[i]
         move = self._affine(shard.color.shape[2], shard.color.shape[1])
         size = (self._width, self._height)
-        color = cv2.warpAffine(shard.color[k], move, size, flags=cv2.INTER_LINEAR, borderValue=(FILL,) * 3)
-        instance = cv2.warpAffine(shard.instance[k], move, size, flags=cv2.INTER_NEAREST)
-        depth = cv2.warpAffine(shard.depth[k], move, size, flags=cv2.INTER_NEAREST).astype(np.float32) / 1000
+        # boxes count from the edge of a pixel, OpenCV from its middle
+        centred = move.copy()
+        centred[:, 2] += 0.5 * (np.diag(move[:, :2]) - 1)
+        fill = (FILL,) * 3
+        color = np.asarray(cv2.warpAffine(shard.color[k], centred, size, borderValue=fill), np.uint8)
+        instance = np.asarray(cv2.warpAffine(shard.instance[k], centred, size, flags=cv2.INTER_NEAREST), np.uint16)
+        depth_mm = np.asarray(cv2.warpAffine(shard.depth[k], centred, size, flags=cv2.INTER_NEAREST), np.float32)
+        depth = depth_mm / np.float32(1000)
         boxes, classes, counts, ids = self._place(shard.boxes[k], move)
         cells = shard.shown[instance[4::8, 4::8]].ravel()
         color = self._paint(color) if self._varied else color
@@ -139,13 +144,13 @@ class Augment:
         gamma = np.exp(random.normal(0, 0.15))
         levels = np.arange(256)[:, None] / 255
         table = np.clip(levels**gamma * gain * 255 + lift, 0, 255).astype(np.uint8)
-        color = cv2.LUT(color, table[None])
+        color = np.asarray(cv2.LUT(color, table[None]), np.uint8)
         if random.random() < 0.15:
             gray = color.mean(axis=2, keepdims=True)
             share = random.uniform(0.3, 1.0)
             color = (color * (1 - share) + gray * share).astype(np.uint8)
         if random.random() < 0.2:
-            color = cv2.GaussianBlur(color, (0, 0), random.uniform(0.4, 1.2))
+            color = np.asarray(cv2.GaussianBlur(color, (0, 0), random.uniform(0.4, 1.2)), np.uint8)
         if random.random() < 0.2:
             shape = color.shape
             color = np.clip(color + random.normal(0, random.uniform(2, 8), shape).astype(np.float32), 0, 255).astype(
@@ -156,12 +161,18 @@ class Augment:
 
 def batches(augment: Augment, size: int, ahead: int = 6) -> Iterator[list[Sample]]:
     """Endless batches, prepared by one thread beside the training."""
-    ready: queue.Queue[list[Sample]] = queue.Queue(ahead)
+    ready: queue.Queue[list[Sample] | Exception] = queue.Queue(ahead)
 
     def prepare() -> None:
-        while True:
-            ready.put([augment.sample() for _ in range(size)])
+        try:
+            while True:
+                ready.put([augment.sample() for _ in range(size)])
+        except Exception as error:  # handed on, or the training would wait for ever
+            ready.put(error)
 
     threading.Thread(target=prepare, daemon=True).start()
     while True:
-        yield ready.get()
+        batch = ready.get()
+        if isinstance(batch, Exception):
+            raise batch
+        yield batch

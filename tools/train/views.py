@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -46,10 +47,12 @@ def render_house(seed: int, views: int, folder: Path) -> Path:
     renderer = Renderer(house, WIDTH, HEIGHT)
     settings = house_settings(seed)
     random = np.random.default_rng([seed, SALT])
-    colors, depths, instances = [], [], []
+    colors: list[NDArray[np.uint8]] = []
+    depths: list[NDArray[np.uint16]] = []
+    instances: list[NDArray[np.uint16]] = []
     for pose in _poses(house, views, random):
         view = renderer.render(pose)
-        if len(np.unique(view.instance)) <= LEAST_OBJECTS and random.random() < 0.8:
+        if colors and len(np.unique(view.instance)) <= LEAST_OBJECTS and random.random() < 0.8:
             continue
         color, depth_m = sense(view, renderer.intrinsics, random, settings)
         colors.append(color)
@@ -57,7 +60,7 @@ def render_house(seed: int, views: int, folder: Path) -> Path:
         instances.append(view.instance)
     item_class = np.array([NAMES.index(item.item.name) for item in house.items], np.uint8)
     boxes = [np.insert(visible_boxes(one, item_class), 0, k, axis=1) for k, one in enumerate(instances)]
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "color": np.stack(colors),
         "depth": np.stack(depths),
         "instance": np.stack(instances),
@@ -65,7 +68,7 @@ def render_house(seed: int, views: int, folder: Path) -> Path:
         "boxes": np.concatenate(boxes),
     }
     partial = shard.with_suffix(".part")
-    partial.mkdir(exist_ok=True)
+    partial.mkdir(parents=True, exist_ok=True)
     for name, array in arrays.items():
         np.save(partial / f"{name}.npy", array)
     partial.rename(shard)
@@ -110,7 +113,7 @@ def _poses(house: House, views: int, random: np.random.Generator) -> list[F64]:
     rooms = np.array([item.room for item in house.items])
     poses = []
     for _ in range(views):
-        tries = []
+        tries: list[tuple[int, int, F64]] = []
         for index in random.integers(0, len(places), int(random.integers(LEAST_TRIES, MOST_TRIES + 1))):
             x, y, z = places[int(index)]
             eye = np.array([x, y, z + random.uniform(0.9, 1.6)])

@@ -88,8 +88,8 @@ PAIRS = (block(-2.25, -0.25), block(-1.5, -0.25), block(1.0, -0.25), block(1.75,
 def test_objects_mostly_inside_a_mask_are_its_members():
     areas = detect([((0.8, -0.5, 2.6, 0.5), 0.9), ((-2.4, -0.5, -0.9, 0.5), 0.8)], *PAIRS)
     assert [area.members for area in areas] == [(0, 1), (2, 3)]
-    assert areas[0].outline.min(axis=0) == pytest.approx((-2.25, -0.25), abs=0.06)
-    assert areas[0].outline.max(axis=0) == pytest.approx((-1.05, 0.2), abs=0.06)
+    assert areas[0].outline.min(axis=0) == pytest.approx((-2.4, -0.5), abs=0.06)
+    assert areas[0].outline.max(axis=0) == pytest.approx((-0.9, 0.5), abs=0.06)
 
 
 def test_an_object_belongs_to_the_better_of_two_masks():
@@ -97,10 +97,23 @@ def test_an_object_belongs_to_the_better_of_two_masks():
     assert [area.members for area in areas] == [(0, 1), (2, 3)]
 
 
-def test_uncertain_masks_and_masks_without_enough_objects_are_none():
+def test_the_outline_holds_members_that_stand_and_not_those_that_hang():
+    hanging = block(2.4, -0.25, 0.5, (1.2, 1.6))
+    counterweight = block(-2.85, -0.25)  # keeps the middle of all at the origin
+    mask = (0.8, -0.5, 2.5, 0.5)
+    (area,) = detect([(mask, 0.9)], *PAIRS, hanging, counterweight, inside_share=0.15)
+    assert area.members == (2, 3, 4)
+    assert area.outline[:, 0].max() < 2.6
+    standing = block(2.4, -0.25, 0.5, (0.0, 1.6))
+    (area,) = detect([(mask, 0.9)], *PAIRS, standing, counterweight, inside_share=0.15)
+    assert area.outline[:, 0].max() > 2.8
+
+
+def test_uncertain_empty_and_tiny_masks_are_none():
     assert detect([((0.8, -0.5, 2.6, 0.5), 0.1)], *PAIRS, min_score=0.2) == []
-    assert detect([((0.8, -0.5, 1.6, 0.5), 0.9)], *PAIRS, least_objects=2) == []
     assert detect([((0.8, 2.0, 1.6, 2.5), 0.9)], *PAIRS) == []
+    assert len(detect([((0.8, -0.5, 1.6, 0.5), 0.9)], *PAIRS)) == 1
+    assert detect([((0.8, -0.5, 1.6, 0.5), 0.9)], *PAIRS, least_area_m2=2.0) == []
 
 
 def test_no_objects_need_no_network():

@@ -11,7 +11,7 @@ from placegraph.runtime.geometry import inverse, transform
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.tools.evaluate.aligned_map import read_aligned, read_object_clouds
-from placegraph.tools.evaluate.objects import LEAST_FRAMES, LEAST_PX
+from placegraph.tools.evaluate.objects import LEAST_FRAMES
 from placegraph.tools.evaluate.report import number, plain, table
 from placegraph.tools.evaluate.trajectory import level_alignment
 from placegraph.tools.house.build import build
@@ -32,7 +32,7 @@ def source(tmp_path_factory):
     folder = tmp_path_factory.mktemp("house") / "made"
     run = export(ORDER, folder, workers=1)
     house = build(ORDER.seed, ORDER.floors)
-    seen = tuple(Seen(item.id, LEAST_FRAMES, LEAST_PX) for item in house.items)
+    seen = tuple(Seen(item.id, LEAST_FRAMES, LEAST_FRAMES) for item in house.items)
     write_truth(truth_of(house, run, seen), folder)
     return folder
 

@@ -3,7 +3,7 @@ import pytest
 
 from placegraph.runtime.scene_graph import Tag
 from placegraph.tools.evaluate.aligned_map import MapObject
-from placegraph.tools.evaluate.objects import LEAST_FRAMES, LEAST_PX, class_of_word, object_scores, seen_well, top_k
+from placegraph.tools.evaluate.objects import LEAST_FRAMES, class_of_word, object_scores, seen_well, top_k
 from placegraph.tools.house.classes import CLASSES, NAMES
 from placegraph.tools.house.truth import OrientedBox, Seen, TrueObject
 
@@ -27,15 +27,15 @@ def things(*rows):
 
 def scores(found, true, poor=(), unseen=()):
     seen = [
-        Seen(i, 0 if i in unseen else LEAST_FRAMES, 0 if i in unseen else LEAST_PX - (i in poor))
+        Seen(i, 0 if i in unseen else LEAST_FRAMES, 0 if i in unseen else LEAST_FRAMES - (i in poor))
         for i in range(len(true))
     ]
     return object_scores(things(*found), truth(*true), seen)
 
 
 def test_seen_well_needs_frames_and_pixels() -> None:
-    assert seen_well(Seen(0, LEAST_FRAMES, LEAST_PX))
-    assert not seen_well(Seen(0, LEAST_FRAMES - 1, 9999)) and not seen_well(Seen(0, 9999, LEAST_PX - 1))
+    assert seen_well(Seen(0, 99, LEAST_FRAMES))
+    assert not seen_well(Seen(0, 99, LEAST_FRAMES - 1))
 
 
 def test_every_word_has_one_class() -> None:

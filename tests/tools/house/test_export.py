@@ -66,7 +66,7 @@ def test_another_seed_gives_other_bytes(folder: Path, tmp_path: Path):
 
 def test_the_folder_holds_what_is_promised(folder: Path):
     numbers = [f"{index:06d}" for index in range(3)]
-    truth = ("floors", "house", "locations", "objects", "rooms", "seen")
+    truth = ("floors", "house", "locations", "objects", "questions", "rooms", "seen")
     assert set(files(folder)) == {
         *("calibration.txt", "depth.txt", "groundtruth.txt", "plan.png", "rgb.txt"),
         *(f"rgb/{n}.jpg" for n in numbers),
@@ -126,9 +126,10 @@ def test_the_truth_is_that_of_the_house(folder: Path, source: HouseFrames):
 def test_what_is_seen_is_counted_from_the_instance_images(folder: Path):
     images = [cv2.imread(str(p), cv2.IMREAD_UNCHANGED) for p in sorted((folder / "truth" / "instances").iterdir())]
     assert all(image.dtype == np.uint16 and image.shape == (48, 64) for image in images)
+    clear = 400 * (64 * 48) / (640 * 480)
     for seen in read_truth(folder).seen:
         pixels = [int((image == seen.id + 1).sum()) for image in images]
-        assert (seen.frames, seen.most_px) == (sum(n > 0 for n in pixels), max(pixels))
+        assert (seen.frames, seen.clear_frames) == (sum(n > 0 for n in pixels), sum(n >= clear for n in pixels))
     assert any(seen.frames for seen in read_truth(folder).seen)
 
 

@@ -155,7 +155,6 @@ def test_the_float_decoder_equals_the_network(packed):
     np.testing.assert_allclose(got[1], quality.numpy(), atol=1e-4)
 
 
-@pytest.mark.xfail(strict=True, reason="pack._both says the float and the INT8 file by one and the same name")
 def test_every_line_says_another_file(packed):
     _, lines, _, _ = packed
     names = [line.split(":")[0] for line in lines]
