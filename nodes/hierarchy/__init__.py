@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+from placegraph.models_onnx import LocationDetector
+from placegraph.models_onnx.load import load, wrong_task
 from placegraph.nodes.hierarchy.build import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.floors import FloorConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
@@ -35,9 +37,23 @@ class HierarchyNode(Node):
     def __init__(self, config: HierarchyConfig, context: Context) -> None:
         super().__init__(config, context)
         layers = LayerConfig(floors=config.floors, rooms=config.rooms, locations=config.locations)
-        self._builder = GraphBuilder(layers)
+        self._layers, self._builder = layers, GraphBuilder(layers)
         self._map: Map | None = None
         self._graph: SceneGraph | None = None  # of the newest Map, without names
+
+    def start(self) -> None:
+        """Load the network of locations, where one is named.
+
+        Raises:
+            ModelError: its weights are absent, damaged, or not of the family's layout.
+            ConfigError: it does not find locations.
+        """
+        name = self.config.locations.model
+        if name:
+            model = load(name, self.context.model_dirs, self.context.threads)
+            if not isinstance(model, LocationDetector):
+                raise wrong_task("hierarchy", name, model, "find locations")
+            self._builder = GraphBuilder(self._layers, model)
 
     def step(self, message: Message) -> Sequence[Message]:
         """Build or name a graph. Names of another revision are late and ignored. Raises SchemaError for unknown ids."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from placegraph.models_onnx import LocationDetector
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floors
 from placegraph.nodes.hierarchy.identity import Identities, Place, span_footprint
 from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
@@ -42,8 +43,9 @@ class _Room:
 class GraphBuilder:
     """Builds a graph from each Map and remembers which place has which id."""
 
-    def __init__(self, config: LayerConfig) -> None:
-        self._config = config
+    def __init__(self, config: LayerConfig, detector: LocationDetector | None = None) -> None:
+        """`detector` is the network that config.locations.model names; None where it names none."""
+        self._config, self._detector = config, detector
         self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
 
     def build(self, world: Map) -> SceneGraph:
@@ -80,14 +82,15 @@ class GraphBuilder:
         return [_Room(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
 
     def _fill(self, room: _Room, members: list[int], objects: list[Points], world: Map) -> list[Node]:
-        areas = find_locations([objects[i] for i in members], room.span, self._config.locations)
+        mine = [objects[i] for i in members]
+        areas = find_locations(mine, room.span, self._config.locations, self._detector)
         ids = self._locations.assign([Place(area.outline, room.floor) for area in areas])
         parent = dict.fromkeys(members, room.id)
         nodes = []
         for location_id, area in zip(ids, areas, strict=True):
-            mine = [members[k] for k in area.members]
-            parent.update(dict.fromkeys(mine, location_id))
-            box = bounding_box(world.object_boxes_world[mine].reshape(-1, 3))
+            held = [members[k] for k in area.members]
+            parent.update(dict.fromkeys(held, location_id))
+            box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
         return nodes + [_object(i, parent[i], objects[i], world) for i in members]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -56,7 +57,8 @@ class _Reader(CalibrationDataReader):
 def quantise(float_file: Path, file: Path, feeds: Iterator[Feeds], keep_float: Sequence[str] = ()) -> Path:
     """Write `float_file` as static INT8 (QDQ, weights by channel), ranges from `feeds`.
 
-    keep_float: parts of node names that stay float (heads whose small differences matter).
+    keep_float: patterns of the whole names of nodes that stay float. What joins numbers of different kinds (px and
+    scores, metres and features) must: one INT8 range cannot hold both.
     """
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
@@ -71,7 +73,7 @@ def quantise(float_file: Path, file: Path, feeds: Iterator[Feeds], keep_float: S
             activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,
             op_types_to_quantize=list(QUANTISED),
-            nodes_to_exclude=[name for name in nodes if any(part in name for part in keep_float)],
+            nodes_to_exclude=[name for name in nodes if any(re.fullmatch(one, name) for one in keep_float)],
         )
     return file
 

@@ -17,7 +17,13 @@ from placegraph.tools.train.loop import read_average
 NAME = "house_locations"
 CALIBRATION_IMAGES = 200
 CALIBRATION_SEED = 7
-KEEP_FLOAT = ("/heads.0/heads.0.2", "/heads.1/heads.1.2", "/heads.2/heads.2.2", "/prototypes/prototypes.1")
+# last layers, and what joins distances, scores and coefficients
+KEEP_FLOAT = (
+    r"/network/heads\.\d/heads\.\d\.2/.*",
+    r"/network/prototypes/.*",
+    r"/network/Concat_[5-8]",
+    r"/(Concat|Add)\w*",
+)
 
 
 def export_locations(checkpoint: Path, data: Path, folder: Path) -> tuple[Path, Path]:

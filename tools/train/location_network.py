@@ -101,7 +101,7 @@ def losses(outputs: tuple[Tensor, Tensor, Tensor, Tensor], shown: list[Shown], s
         if not len(one.boxes):
             continue
         none = torch.zeros(len(one.boxes), dtype=torch.long)
-        owner, quality = assign(found[k].detach(), scores[k].detach(), one.boxes, none, centres)
+        owner, quality = assign(found[k].detach(), scores[k].detach().T, one.boxes, none, centres)
         mine = torch.nonzero(owner >= 0)[:, 0]
         if not len(mine):
             continue

@@ -28,10 +28,16 @@ LEAST_SHOWN = 12
 CALIBRATION_SEED = 5
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)[:, None, None]
 STD = np.array([0.229, 0.224, 0.225], np.float32)[:, None, None]
-# last layers whose small differences matter: box distances, the meeting of words and pixels, logits of masks
+# last layers, whose small differences matter, and what joins pixels and scores
 KEEP_FLOAT = {
-    "detector": ("/network/boxes.0/boxes.0.2", "/network/boxes.1/boxes.1.2", "/network/boxes.2/boxes.2.2"),
-    "mask_decoder": ("/mask/Conv",),
+    "detector": (
+        r"/network/boxes\.\d/boxes\.\d\.1/.*",
+        r"/network/(words|texts\.\d)/(?!embed).*",
+        r"(/network)?/(Concat|Add)\w*",
+    ),
+    "tagger": (r"/words/.*", r"/dense/(?!embed).*"),
+    "mask_encoder": ("/Concat", "/Concat_4", r"/to2/to2\.0/.*"),
+    "mask_decoder": ("/mask/Conv", r"/Add\w*", r"/Concat(_1|_2)?", "/enter/.*"),
 }
 
 
@@ -49,12 +55,12 @@ def pack(work: Path, calibration: Path) -> Iterator[str]:
     detector = _detector(work, folder)
     yield from _both(detector, folder, "house_detector", _detector_feeds(views), KEEP_FLOAT["detector"])
     tagger = _tagger(work, folder)
-    yield from _both(tagger, folder, "house_tagger", _tagger_feeds(squashed), ())
+    yield from _both(tagger, folder, "house_tagger", _tagger_feeds(squashed), KEEP_FLOAT["tagger"])
     (folder / "house_tags.txt").write_text("".join(f"{name}\n" for name in NAMES))
     chosen = thresholds(_scores(folder / "house_tagger.onnx", squashed), tag_targets(squashed).numpy())
     (folder / "house_tag_thresholds.txt").write_text("".join(f"{value:.3f}\n" for value in chosen))
     encoder, decoder = _masks(work, folder)
-    yield from _both(encoder, folder, "house_mask_encoder", _encoder_feeds(views), ())
+    yield from _both(encoder, folder, "house_mask_encoder", _encoder_feeds(views), KEEP_FLOAT["mask_encoder"])
     yield from _both(decoder, folder, "house_mask_decoder", _decoder_feeds(work, views), KEEP_FLOAT["mask_decoder"])
 
 
