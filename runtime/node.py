@@ -16,7 +16,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Message
 
 NODES = "placegraph.nodes"
-EXTRAS = {"depthai": "oak", "embreex": "demo", "trimesh": "demo"}  # which extra brings an optional package
+EXTRAS = {"depthai": "oak", "embreex": "demo"}  # which extra brings an optional package
 
 
 class NodeConfig(BaseModel):

@@ -42,6 +42,7 @@ class Synthetic:
         self.settings = read_settings(Settings, settings)
         # By name, as a plug-in: the generator is a tool, which a node must not import, and it needs libraries (ray
         # casting) that no other node needs. Loaded here so that a missing one is told before the run starts.
+        plugin("placegraph.tools.house", "render", "Renderer", "house generator")
         self._generator = plugin("placegraph.tools.house", "build", "HouseFrames", "house generator")
 
     @staticmethod

@@ -6,15 +6,15 @@ import hashlib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from placegraph.runtime.node import plugin
 from placegraph.tools.house.furnish import furnish
 from placegraph.tools.house.model import House
 from placegraph.tools.house.plan import lay_out
-from placegraph.tools.house.render import Renderer
 from placegraph.tools.house.sensor import house_settings, sense
 from placegraph.tools.house.walk import walk
 
@@ -48,6 +48,14 @@ def build(seed: int, floors: int | None = None) -> House:
     return furnish(lay_out(seed, floors), seed)
 
 
+def renderer_of(house: House, width: int, height: int) -> Any:
+    """A render.Renderer; raises ConfigError that names the extra when the ray casting library is not installed.
+
+    Loaded when it is asked for: the library is an extra, and truth can be read and scored without it.
+    """
+    return plugin("placegraph.tools.house", "render", "Renderer", "renderer")(house, width, height)
+
+
 class HouseFrames:
     """The frames of one house along its walk; each is made by itself, so any may be made first, in any process."""
 
@@ -55,7 +63,7 @@ class HouseFrames:
         self.house = build(seed, floors)
         self.stamps_ns, self.world_from_camera = walk(self.house, seed)
         self._sensor_settings = house_settings(seed)
-        self._renderer = Renderer(self.house, width, height)
+        self._renderer = renderer_of(self.house, width, height)
         self.intrinsics: F64 = np.asarray(self._renderer.intrinsics, np.float64)  # (4,) fx fy cx cy in px
 
     def count(self, limit: int = 0) -> int:

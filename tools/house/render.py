@@ -6,8 +6,6 @@ and one bilinear lookup in the texture atlas.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -18,6 +16,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.tools.house.light import baked, nearest_lamps
 from placegraph.tools.house.mesh import Mesh, mesh_of
 from placegraph.tools.house.model import House, Material
+from placegraph.tools.house.sensor import View
 from placegraph.tools.house.textures import LEVEL_LEFT_PX, LEVEL_SIZES_PX, LEVELS, atlas
 
 F32 = NDArray[np.float32]
@@ -26,19 +25,6 @@ I64 = NDArray[np.int64]
 U8 = NDArray[np.uint8]
 
 _BAND_ROWS = 32  # so many rows at a time: the intermediate arrays stay in the processor's cache
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """One noise-free picture: color (H, W, 3) uint8 sRGB, depth_m (H, W) float32 along the optical axis with 0 where
-    nothing is hit, instance (H, W) uint16 item id + 1 with 0 for the building, and shine (H, W) uint8: the greater of
-    gloss and glow, times 255, where stereo finds little to match.
-    """
-
-    color: U8
-    depth_m: F32
-    instance: NDArray[np.uint16]
-    shine: U8
 
 
 class Renderer:

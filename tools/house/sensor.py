@@ -14,13 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placegraph.runtime.errors import SourceError
-from placegraph.tools.house.render import View
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
 
 NATIVE_WIDTH_PX = 640  # disparities below are in pixels of the mono cameras' 640 x 400 or 480 output
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One noise-free picture: color (H, W, 3) uint8 sRGB, depth_m (H, W) float32 along the optical axis with 0 where
+    nothing is hit, instance (H, W) uint16 item id + 1 with 0 for the building, and shine (H, W) uint8: the greater of
+    gloss and glow, times 255, where stereo finds little to match.
+    """
+
+    color: U8
+    depth_m: F32
+    instance: NDArray[np.uint16]
+    shine: U8
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,48 @@ def masks(data: Data, work: Work, steps: Steps = 4000, threads: Threads = 2) -> 
 
 
 @app.command()
+def scans(data: Data, houses: Annotated[int, typer.Option(min=1, help="How many houses.")] = 95) -> None:
+    """Simulate what walks through houses leave of their furniture: what the location detector is trained on."""
+    from placegraph.tools.train.locations import write_houses
+    from placegraph.tools.train.views import TRAINING_SEEDS
+
+    write_houses(TRAINING_SEEDS[:houses], data)
+
+
+@app.command()
+def locations(data: Data, work: Work, steps: Steps = 3200, threads: Threads = 1) -> None:
+    """Train the location detector on scans and write it to WORK/onnx."""
+    from placegraph.tools.train.location_export import export_locations
+    from placegraph.tools.train.locations import train_locations
+
+    train_locations(data, work / "locations.pt", steps, threads=threads)
+    for file in export_locations(work / "locations.pt", data, work / "onnx"):
+        print(file)
+
+
+@app.command("evaluate-locations")
+def evaluate_locations(
+    model: Annotated[list[str] | None, typer.Option(help="Networks of the manifest, besides the recipe.")] = None,
+    models: Annotated[list[Path] | None, typer.Option(help="More folders of weights.")] = None,
+    houses: Annotated[int, typer.Option(min=1, help="How many evaluation houses.")] = 20,
+) -> None:
+    """Compare the paper's labelling recipe, and networks, with the true locations of evaluation houses: F1@delta."""
+    from placegraph.models_onnx import LocationDetector
+    from placegraph.models_onnx.load import load, wrong_task
+    from placegraph.nodes.hierarchy.locations import LocationConfig
+    from placegraph.tools.train.location_labels import comparison, with_config
+    from placegraph.tools.train.views import EVALUATION_SEEDS
+
+    finders = {"recipe": with_config(LocationConfig())}
+    for name in model or ["house_locations"]:
+        network = load(name, models or [])
+        if not isinstance(network, LocationDetector):
+            raise wrong_task("hierarchy", name, network, "find locations")
+        finders[name] = with_config(LocationConfig(model=name), network)
+    print(comparison(finders, EVALUATION_SEEDS[:houses]))
+
+
+@app.command()
 def export(
     work: Work,
     calibration: Annotated[Path, typer.Option(help="Views kept aside: `placegraph train views --calibration`.")],

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from placegraph.tools.house.build import build
+from placegraph.tools.house.build import build, renderer_of
 from placegraph.tools.house.classes import NAMES
 from placegraph.tools.house.model import House
-from placegraph.tools.house.render import Renderer
 from placegraph.tools.house.sensor import house_settings, sense
 from placegraph.tools.house.space import free_grid
 
@@ -44,7 +43,7 @@ def render_house(seed: int, views: int, folder: Path) -> Path:
     if shard.exists():
         return shard
     house = build(seed)
-    renderer = Renderer(house, WIDTH, HEIGHT)
+    renderer = renderer_of(house, WIDTH, HEIGHT)
     settings = house_settings(seed)
     random = np.random.default_rng([seed, SALT])
     colors: list[NDArray[np.uint8]] = []

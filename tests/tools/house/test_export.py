@@ -1,4 +1,5 @@
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,7 @@ from placegraph.tools.house.classes import NAMES
 from placegraph.tools.house.export import HouseOrder
 from placegraph.tools.house.labels import Labels
 from placegraph.tools.house.picture import MARGIN_M, PX_PER_M, TITLE_PX, draw, tint
-from placegraph.tools.house.truth import Truth, read_truth, write_truth
+from placegraph.tools.house.truth import Truth, read_house_run, read_truth, write_truth
 
 ORDER = HouseOrder(seed=5, floors=1, limit=3, width=64, height=48)
 
@@ -258,3 +259,16 @@ def test_the_command_refuses_what_is_no_house(tmp_path: Path):
         order(tmp_path)
     with pytest.raises(ConfigError, match="is a file"):
         order(tmp_path / "letter.txt")
+
+
+def test_replace_removes_a_house_but_nothing_else(tmp_path: Path, folder: Path, monkeypatch):
+    house, other = tmp_path / "house", tmp_path / "other"
+    shutil.copytree(folder, house)
+    monkeypatch.setattr(command, "export", lambda order, out, *_: (out.exists(), read_house_run(folder))[1])
+    order(house, limit=2, replace=True)
+    assert not house.exists()
+    other.mkdir()
+    (other / "letter.txt").touch()
+    with pytest.raises(ConfigError, match="not a house folder"):
+        order(other, replace=True)
+    assert (other / "letter.txt").exists()
