@@ -34,7 +34,7 @@ def test_each_file_is_small() -> None:
     assert {path.name for path in EMBEDDED_DIR.glob("*.onnx") if path.stat().st_size > MOST_BYTES} == set()
 
 
-def test_the_tagger_says_what_is_there_before_what_is_not(views: list[EvaluationView]) -> None:
+def test_the_tagger_says_most_of_what_is_there_and_not_much_else(views: list[EvaluationView]) -> None:
     tagger = load("house_tagger")
     assert isinstance(tagger, Tagger)
     right = wrong = shown = 0
@@ -43,7 +43,8 @@ def test_the_tagger_says_what_is_there_before_what_is_not(views: list[Evaluation
         there = {NAMES[k] for k in np.flatnonzero(view.tags == 1)}
         unknown = {NAMES[k] for k in np.flatnonzero(np.isnan(view.tags))}
         right, wrong, shown = right + len(said & there), wrong + len(said - there - unknown), shown + len(there)
-    assert shown >= 20 and right >= 0.5 * shown and right >= wrong
+    # thresholds favour recall: what is not tagged is never looked for
+    assert shown >= 20 and right >= 0.6 * shown and wrong <= 1.5 * right
 
 
 def test_the_detector_finds_what_it_is_asked_for_also_by_words_it_never_heard(views: list[EvaluationView]) -> None:
