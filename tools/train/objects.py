@@ -18,6 +18,7 @@ from placegraph.tools.train.samples import Augment, Sample, batches, load_shards
 SMALL, LARGE = (256, 320), (320, 416)  # height, width in px: the network runs at the large one
 SMALL_SHARE = 0.7  # of all steps: most learning happens small, where it costs .6 as much
 BATCH = 16
+COMMON = 0.1  # classes that a smaller share of views show (a toilet: .02) are shown more often
 RATE = 1.5e-3
 TEXT_NOISE = (
     0.03  # sigma added to each number of a word's vector (unit length, 256 numbers): words nearby mean the same
@@ -64,7 +65,7 @@ def train_objects(data: Path, checkpoint: Path, steps: int, seed: int = 1, threa
     shards = load_shards(data)
     network = ObjectNetwork().to(memory_format=torch.channels_last)
     prompts = Prompts(seed)
-    streams = {size: batches(Augment(shards, *size, seed + sum(size)), BATCH) for size in (SMALL, LARGE)}
+    streams = {size: batches(Augment(shards, *size, seed + sum(size), common=COMMON), BATCH) for size in (SMALL, LARGE)}
 
     def step(i: int) -> dict[str, Tensor]:
         size = SMALL if i < SMALL_SHARE * steps else LARGE

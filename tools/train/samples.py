@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from placegraph.runtime.errors import SourceError
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
 FILL = 114  # models_onnx/letterbox.py
@@ -68,21 +70,30 @@ class Augment:
     """Random views of shards at one network size, from one seed."""
 
     def __init__(
-        self, shards: list[Shard], height: int, width: int, seed: int, squash: bool = False, varied: bool = True
+        self,
+        shards: list[Shard],
+        height: int,
+        width: int,
+        seed: int,
+        squash: bool = False,
+        varied: bool = True,
+        common: float = 0.0,
     ) -> None:
         """`squash`: the image fills the input whatever its aspect, as RAM++ does, else it is letterboxed; not `varied`:
-        only the order is random.
+        only the order is random. Views of classes that less than a share `common` of all views show come more often.
         """
         self._varied = varied
+        self._repeats = repeats(shards, common)
         self._shards, self._height, self._width, self._squash = shards, height, width, squash
         self._random = np.random.default_rng(seed)
         self._views = [(i, k) for i, shard in enumerate(shards) for k in range(len(shard.color))]
         self._order: list[int] = []
 
     def sample(self) -> Sample:
-        """The next view: every view comes once before any comes again."""
+        """The next view: every view comes once (or so often as its rarest class asks for) before any comes again."""
         if not self._order:
-            self._order = self._random.permutation(len(self._views)).tolist()
+            counts = np.floor(self._repeats + self._random.random(len(self._repeats))).astype(int)
+            self._order = self._random.permutation(np.repeat(np.arange(len(self._views)), counts)).tolist()
         i, k = self._views[self._order.pop()]
         shard = self._shards[i]
         move = self._affine(shard.color.shape[2], shard.color.shape[1])
@@ -157,6 +168,17 @@ class Augment:
                 np.uint8
             )
         return np.asarray(color)
+
+
+def repeats(shards: list[Shard], common: float) -> F64:
+    """How often each view comes in a round (views,), at least 1: sqrt(common / share of views with its rarest class).
+
+    Source: repeat-factor sampling, Gupta et al., "LVIS", CVPR 2019.
+    """
+    shown = [set(rows[:, 1].astype(int).tolist()) for shard in shards for rows in shard.boxes]
+    count = Counter(k for classes in shown for k in classes)
+    factor = {k: max(1.0, (common * len(shown) / n) ** 0.5) for k, n in count.items()}
+    return np.array([max((factor[k] for k in classes), default=1.0) for classes in shown])
 
 
 def batches(augment: Augment, size: int, ahead: int = 6) -> Iterator[list[Sample]]:

@@ -114,20 +114,19 @@ def test_a_few_steps_of_training(tmp_path, monkeypatch):
     monkeypatch.setattr(objects, "BATCH", 2)
     seen = []
 
-    def run(network):
-        def forward(image, text):
-            seen.append((tuple(image.shape), tuple(text.shape)))
-            return network(image, text)
+    real = ObjectNetwork.forward
 
-        return forward
+    def forward(network, image, text):
+        seen.append((tuple(image.shape), tuple(text.shape)))
+        return real(network, image, text)
 
-    monkeypatch.setattr(torch, "compile", run)  # compiling takes minutes
+    monkeypatch.setattr(ObjectNetwork, "forward", forward)
     words = len(CLASSES) + OTHERS
-    found = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=3, threads=1)
+    found = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=4, threads=1)
     small, large = ((2, 3, 64, 64), (2, words, 256)), ((2, 3, 64, 96), (2, words, 256))
-    assert seen == [small, small, large]  # .6 of the steps small
+    assert seen == [small, small, small, large]  # .7 of the steps small
     assert isinstance(found, ObjectNetwork) and not found.training
     assert all(torch.isfinite(value).all() for value in found.state_dict().values() if value.is_floating_point())
-    again = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=3, threads=1)
+    again = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=4, threads=1)
     assert len(seen) == 3  # it was finished
     torch.testing.assert_close(again.words.linear.weight, found.words.linear.weight)

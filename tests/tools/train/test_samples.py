@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import SourceError
-from placegraph.tools.train.samples import FILL, Augment, Sample, Shard, batches, load_shards
+from placegraph.tools.train.samples import FILL, Augment, Sample, Shard, batches, load_shards, repeats
 from placegraph.tools.train.views import visible_boxes
 
 HEIGHT, WIDTH = 96, 128
@@ -224,3 +224,16 @@ def test_a_folder_without_shards_is_named(tmp_path: Path) -> None:
     (tmp_path / "12.part").mkdir()
     with pytest.raises(SourceError, match=f"{tmp_path.name}: no shards"):
         load_shards(tmp_path)
+
+
+def test_views_of_rare_classes_come_more_often() -> None:
+    common = [np.zeros((HEIGHT, WIDTH), np.uint16) for _ in range(99)]
+    for one in common:
+        one[10:40, 10:40] = 1
+    rare = common[0].copy()
+    rare[50:80, 10:40] = 2
+    shards = [make_shard(rare, *common)]
+    assert repeats(shards, 0.0).tolist() == [1.0] * 100
+    assert repeats(shards, 0.16).tolist() == [pytest.approx(4.0)] + [1.0] * 99
+    augment = Augment(shards, HEIGHT, WIDTH, 0, varied=False, common=0.16)
+    assert sum(1 in augment.sample().classes for _ in range(103)) == 4
