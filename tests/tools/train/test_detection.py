@@ -60,7 +60,7 @@ def outputs(found=None, logit=-3.0):
 @pytest.mark.parametrize("size", [0.5, 2.0])
 def test_a_box_smaller_than_a_cell_has_anchors_near_it(x, y, size):
     box = torch.tensor([[x, y, x + size, y + size]])
-    owner, quality = assign(around([]), torch.full((COUNT, WORDS), 0.1), box, torch.tensor([2]), CENTRES)
+    owner, quality = assign(around([]), torch.full((WORDS, COUNT), 0.1), box, torch.tensor([2]), CENTRES)
     mine = torch.nonzero(owner == 0)[:, 0]
     assert 1 <= len(mine) <= 10
     off = (CENTRES[mine] - box[0, :2] - size / 2).norm(dim=1)
@@ -71,13 +71,13 @@ def test_a_box_smaller_than_a_cell_has_anchors_near_it(x, y, size):
 def test_tiny_boxes_of_one_picture_all_have_an_anchor():
     low = torch.tensor([[3.0, 3], [20, 8], [40, 8], [8, 40], [31, 31], [61, 61]])
     boxes = torch.cat((low, low + 2), 1)
-    owner, _ = assign(around([]), torch.full((COUNT, WORDS), 0.1), boxes, torch.zeros(6, dtype=torch.long), CENTRES)
+    owner, _ = assign(around([]), torch.full((WORDS, COUNT), 0.1), boxes, torch.zeros(6, dtype=torch.long), CENTRES)
     assert set(owner.tolist()) == {-1, 0, 1, 2, 3, 4, 5}
 
 
 def test_anchors_outside_answer_for_nothing():
     box = torch.tensor([[16.0, 16, 40, 48]])
-    owner, quality = assign(around(box), torch.full((COUNT, WORDS), 0.5), box, torch.tensor([0]), CENTRES)
+    owner, quality = assign(around(box), torch.full((WORDS, COUNT), 0.5), box, torch.tensor([0]), CENTRES)
     mine = owner >= 0
     assert mine.sum() == 10  # of the 12 + 2 + 0 inside
     assert ((CENTRES[mine] > box[0, :2]) & (CENTRES[mine] < box[0, 2:])).all()
@@ -91,7 +91,7 @@ def test_a_contested_anchor_goes_to_the_box_of_higher_iou():
     found = around([])
     steps = torch.linspace(0.5, 13.5, int(shared.sum()))  # from near the first to near the second
     found[shared] = boxes[0] + steps[:, None]
-    owner, _ = assign(found, torch.full((COUNT, WORDS), 0.5), boxes, torch.tensor([1, 1]), CENTRES)
+    owner, _ = assign(found, torch.full((WORDS, COUNT), 0.5), boxes, torch.tensor([1, 1]), CENTRES)
     assert shared.sum() == 11  # each box asks for ten of them
     assert owner[shared].tolist() == iou(boxes, found[shared]).argmax(0).tolist()
     assert set(owner[shared].tolist()) == {0, 1}
@@ -99,10 +99,10 @@ def test_a_contested_anchor_goes_to_the_box_of_higher_iou():
 
 def test_an_anchor_that_scores_the_word_is_preferred():
     box = torch.tensor([[0.0, 0, 64, 64]])
-    scores = torch.full((COUNT, WORDS), 0.01)
+    scores = torch.full((WORDS, COUNT), 0.01)
     wanted = torch.arange(20, 30)
-    scores[wanted, 3] = 0.9
-    scores[40:50, 2] = 0.9  # another word
+    scores[3, wanted] = 0.9
+    scores[2, 40:50] = 0.9  # another word
     owner, _ = assign(around(box), scores, box, torch.tensor([3]), CENTRES)
     assert torch.nonzero(owner == 0)[:, 0].tolist() == wanted.tolist()
 
@@ -110,7 +110,7 @@ def test_an_anchor_that_scores_the_word_is_preferred():
 def perfect(boxes, prompts, cells):
     """Outputs that answer exactly for the anchors that are assigned, and exactly no elsewhere."""
     found = around(boxes)
-    owner, _ = assign(found, torch.full((COUNT, WORDS), 0.5), boxes, torch.tensor(prompts), CENTRES)
+    owner, _ = assign(found, torch.full((WORDS, COUNT), 0.5), boxes, torch.tensor(prompts), CENTRES)
     logits = torch.full((1, WORDS, COUNT), -15.0)
     mine = owner >= 0
     logits[0, torch.tensor(prompts)[owner[mine]], mine] = 15.0

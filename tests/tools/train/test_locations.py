@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
+torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
 from placegraph.models_onnx.manifest import Weights  # noqa: E402
 from placegraph.models_onnx.yolo_locations import FAMILY  # noqa: E402
