@@ -39,20 +39,43 @@ def views(
 
 @app.command()
 def objects(data: Data, work: Work, steps: Steps = 9000, threads: Threads = 2) -> None:
-    """Train the detector, with the dense head from which the tagger is made."""
+    """Train the detector from nothing, with the dense head from which the tagger is made."""
     from placegraph.tools.train.objects import train_objects
 
     train_objects(data, work / "objects.pt", steps, threads=threads)
 
 
 @app.command()
-def tags(data: Data, work: Work, steps: Steps = 1000, threads: Threads = 2) -> None:
-    """Tune the tagger; needs the trained objects."""
+def refine(
+    data: Data,
+    work: Work,
+    steps: Steps = 9000,
+    threads: Threads = 2,
+    from_package: Annotated[
+        bool, typer.Option("--from-package", help="Begin with the packaged weights, not with WORK/objects.pt.")
+    ] = False,
+) -> None:
+    """Train the objects further on larger images; with --from-package also on views of your own."""
+    from placegraph.models_onnx.manifest import find
+    from placegraph.tools.train.fold import folded, packaged_start
     from placegraph.tools.train.loop import read_average
     from placegraph.tools.train.networks import ObjectNetwork
+    from placegraph.tools.train.objects import refine_objects
+
+    if from_package:
+        start = packaged_start(find("house_detector").files["model"], find("house_tagger").files["model"])
+    else:
+        start = folded(read_average(work / "objects.pt", ObjectNetwork()))
+    refine_objects(start, data, work / "refined.pt", steps, threads=threads)
+
+
+@app.command()
+def tags(data: Data, work: Work, steps: Steps = 1000, threads: Threads = 2) -> None:
+    """Tune the tagger; needs the refined objects."""
+    from placegraph.tools.train.objects import read_refined
     from placegraph.tools.train.tags import train_tagger
 
-    train_tagger(data, read_average(work / "objects.pt", ObjectNetwork()), work / "tags.pt", steps, threads=threads)
+    train_tagger(data, read_refined(work / "refined.pt"), work / "tags.pt", steps, threads=threads)
 
 
 @app.command()
@@ -110,7 +133,7 @@ def export(
     work: Work,
     calibration: Annotated[Path, typer.Option(help="Views kept aside: `placegraph train views --calibration`.")],
 ) -> None:
-    """Write float and INT8 ONNX files of what is trained into WORK/onnx, with thresholds and checksums."""
+    """Write float and INT8 ONNX files of each network trained so far into WORK/onnx, with thresholds and checksums."""
     from placegraph.tools.train.pack import pack
 
     for line in pack(work, calibration):

@@ -8,10 +8,12 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, nn
+
+Network = TypeVar("Network", bound=nn.Module)
 
 AVERAGE = 0.9995  # of the averaged weights, reached slowly
 SAVE_EVERY, SAY_EVERY = 250, 50
@@ -60,7 +62,7 @@ def fit(
     return average.eval()
 
 
-def read_average(checkpoint: Path, network: nn.Module) -> nn.Module:
+def read_average(checkpoint: Path, network: Network) -> Network:
     """Load the averaged weights of a checkpoint into a network of the same kind."""
     network.load_state_dict(torch.load(checkpoint, weights_only=True)["average"])
     return network.eval()

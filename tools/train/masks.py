@@ -12,9 +12,10 @@ from torch.nn import functional
 
 from placegraph.tools.train import loop
 from placegraph.tools.train.networks import MaskDecoder, MaskEncoder
-from placegraph.tools.train.objects import LARGE, images_of
+from placegraph.tools.train.objects import images_of
 from placegraph.tools.train.samples import Augment, Sample, batches, load_shards
 
+SIZE = (320, 416)  # height, width in px
 BATCH = 4
 BOXES = 8  # of an image and step
 RATE = 2e-3
@@ -91,7 +92,7 @@ def train_masks(data: Path, checkpoint: Path, steps: int, seed: int = 2, threads
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
     network = MaskNetwork().to(memory_format=torch.channels_last)
-    stream = batches(Augment(load_shards(data), *LARGE, seed), BATCH)
+    stream = batches(Augment(load_shards(data), *SIZE, seed), BATCH)
     random = np.random.default_rng(seed)
     line = network.decoder.line.numpy()
     within = ((line >= 0) & (line <= 1)).astype(np.float32)

@@ -82,14 +82,14 @@ class Backbone(nn.Module):
         super().__init__()
         self.stem = nn.Sequential(Conv(3, 16, 3, 2), Conv(16, 32, 3, 2), Csp(32, 32, 1))
         self.to8 = nn.Sequential(Conv(32, 64, 3, 2), Csp(64, 64, 2))
-        self.to16 = nn.Sequential(Conv(64, 112, 3, 2), Csp(112, 112, 2))
-        self.to32 = nn.Sequential(Conv(112, 176, 3, 2), Csp(176, 176, 1), PooledPyramid(176))
-        self.down16 = Csp(176 + 112, 80, 1)
-        self.down8 = Csp(80 + 64, 64, 1)
+        self.to16 = nn.Sequential(Conv(64, 112, 3, 2), Csp(112, 112, 4))
+        self.to32 = nn.Sequential(Conv(112, 176, 3, 2), Csp(176, 176, 3), PooledPyramid(176))
+        self.down16 = Csp(176 + 112, 80, 2)
+        self.down8 = Csp(80 + 64, 64, 2)
         self.up16 = Conv(64, 64, 3, 2)
-        self.join16 = Csp(64 + 80, 80, 1)
+        self.join16 = Csp(64 + 80, 80, 2)
         self.up32 = Conv(80, 80, 3, 2)
-        self.join32 = Csp(80 + 176, 112, 1)
+        self.join32 = Csp(80 + 176, 112, 2)
 
     def forward(self, image: Tensor) -> list[Tensor]:
         """Features at each of STRIDES."""

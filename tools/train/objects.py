@@ -12,14 +12,17 @@ from placegraph.models_onnx.text import TextEncoder
 from placegraph.tools.house.classes import CLASSES
 from placegraph.tools.train import loop
 from placegraph.tools.train.detection import losses, targets_of
+from placegraph.tools.train.fold import folded
 from placegraph.tools.train.networks import ObjectNetwork
 from placegraph.tools.train.samples import Augment, Sample, batches, load_shards
 
-SMALL, LARGE = (256, 320), (320, 416)  # height, width in px: the network runs at the large one
-SMALL_SHARE = 0.7  # of all steps: most learning happens small, where it costs .6 as much
+# height and width in px of most steps, where they cost less, and of the last ones; the network runs at the very last
+FIRST_SIZES = (256, 320), (320, 416)
+SIZES = (384, 512), (480, 640)
+SMALL_SHARE = 0.8  # of all steps
 BATCH = 16
 COMMON = 0.1  # classes that a smaller share of views show (a toilet: .02) are shown more often
-RATE = 1.5e-3
+FIRST_RATE, RATE = 1.5e-3, 8e-4
 TEXT_NOISE = (
     0.03  # sigma added to each number of a word's vector (unit length, 256 numbers): words nearby mean the same
 )
@@ -59,20 +62,46 @@ def images_of(samples: list[Sample]) -> Tensor:
 
 
 def train_objects(data: Path, checkpoint: Path, steps: int, seed: int = 1, threads: int = 2) -> ObjectNetwork:
-    """Train on the shards of `data`, going on from `checkpoint`; returns the averaged network."""
+    """Train from nothing on the shards of `data`, going on from `checkpoint`; returns the averaged network."""
     torch.manual_seed(seed)
+    return _fit(ObjectNetwork(), data, checkpoint, steps, FIRST_SIZES, FIRST_RATE, seed, threads)
+
+
+def refine_objects(
+    start: ObjectNetwork, data: Path, checkpoint: Path, steps: int, seed: int = 2, threads: int = 2
+) -> ObjectNetwork:
+    """Train a `folded` network further, on larger images, going on from `checkpoint`; returns the averaged network."""
+    torch.manual_seed(seed)
+    return _fit(start, data, checkpoint, steps, SIZES, RATE, seed, threads)
+
+
+def read_refined(checkpoint: Path) -> ObjectNetwork:
+    """The averaged network that refine_objects left in `checkpoint`."""
+    return loop.read_average(checkpoint, folded(ObjectNetwork()))
+
+
+def _fit(
+    network: ObjectNetwork,
+    data: Path,
+    checkpoint: Path,
+    steps: int,
+    sizes: tuple[tuple[int, int], tuple[int, int]],
+    rate: float,
+    seed: int,
+    threads: int,
+) -> ObjectNetwork:
     torch.set_num_threads(threads)
     shards = load_shards(data)
-    network = ObjectNetwork().to(memory_format=torch.channels_last)
     prompts = Prompts(seed)
-    streams = {size: batches(Augment(shards, *size, seed + sum(size), common=COMMON), BATCH) for size in (SMALL, LARGE)}
+    augments = [Augment(shards, *size, seed + sum(size), common=COMMON, with_depth=False) for size in sizes]
+    streams = [batches(augment, BATCH) for augment in augments]
 
     def step(i: int) -> dict[str, Tensor]:
-        size = SMALL if i < SMALL_SHARE * steps else LARGE
-        samples = next(streams[size])
+        large = i >= SMALL_SHARE * steps
+        samples = next(streams[large])
         text = prompts.draw()
         with torch.autocast("cpu", dtype=torch.bfloat16):
             outputs = network(images_of(samples), text.expand(len(samples), -1, -1))
-        return losses(outputs, targets_of(samples, len(text)), *size)
+        return losses(outputs, targets_of(samples, len(text)), *sizes[large])
 
-    return loop.fit(network, step, steps=steps, rate=RATE, checkpoint=checkpoint)
+    return loop.fit(network.to(memory_format=torch.channels_last), step, steps=steps, rate=rate, checkpoint=checkpoint)

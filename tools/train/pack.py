@@ -15,10 +15,12 @@ from placegraph.models_onnx.text import TextEncoder
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.house.classes import NAMES
 from placegraph.tools.train.export import Feeds, export, image_feed, quantise
+from placegraph.tools.train.fold import folded
 from placegraph.tools.train.loop import read_average
+from placegraph.tools.train.masks import SIZE as MASK_SIZE
 from placegraph.tools.train.masks import MaskNetwork
 from placegraph.tools.train.networks import Detector, MaskEncoder, ObjectNetwork, Tagger
-from placegraph.tools.train.objects import LARGE
+from placegraph.tools.train.objects import SIZES, read_refined
 from placegraph.tools.train.samples import Augment, Sample, load_shards
 from placegraph.tools.train.tags import SIZE as TAG_SIZE
 from placegraph.tools.train.tags import tag_targets
@@ -42,26 +44,38 @@ KEEP_FLOAT = {
 
 
 def pack(work: Path, calibration: Path) -> Iterator[str]:
-    """Write WORK/onnx: every network as float and INT8, the tags and their thresholds; says what was written.
+    """Write WORK/onnx: each network trained so far as float and INT8, tags and thresholds; says what it wrote.
 
-    Raises ConfigError when a checkpoint is missing.
+    Raises ConfigError when nothing is trained yet.
     """
-    for name in ("objects.pt", "tags.pt", "masks.pt"):
-        if not (work / name).exists():
-            raise ConfigError(f"{work / name}: not trained yet: `placegraph train {name.removesuffix('.pt')}`")
-    folder = work / "onnx"
-    views = _views(calibration, *LARGE, squash=False)
-    squashed = _views(calibration, TAG_SIZE, TAG_SIZE, squash=True)
-    detector = _detector(work, folder)
-    yield from _both(detector, folder, "house_detector", _detector_feeds(views), KEEP_FLOAT["detector"])
-    tagger = _tagger(work, folder)
-    yield from _both(tagger, folder, "house_tagger", _tagger_feeds(squashed), KEEP_FLOAT["tagger"])
+    trained = [part for name, part in PARTS.items() if (work / name).exists()]
+    if not trained:
+        raise ConfigError(f"{work}: no {', '.join(PARTS)}: nothing is trained yet, see `placegraph train`")
+    for part in trained:
+        yield from part(work, calibration, work / "onnx")
+
+
+def _pack_detector(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
+    views = _views(calibration, *SIZES[-1], squash=False)
+    yield from _both(_detector(work, folder), folder, "house_detector", _detector_feeds(views), KEEP_FLOAT["detector"])
+
+
+def _pack_tagger(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
+    views = _views(calibration, TAG_SIZE, TAG_SIZE, squash=True)
+    yield from _both(_tagger(work, folder), folder, "house_tagger", _tagger_feeds(views), KEEP_FLOAT["tagger"])
     (folder / "house_tags.txt").write_text("".join(f"{name}\n" for name in NAMES))
-    chosen = thresholds(_scores(folder / "house_tagger.onnx", squashed), tag_targets(squashed).numpy())
+    chosen = thresholds(_scores(folder / "house_tagger.onnx", views), tag_targets(views).numpy())
     (folder / "house_tag_thresholds.txt").write_text("".join(f"{value:.3f}\n" for value in chosen))
+
+
+def _pack_masks(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
+    views = _views(calibration, *MASK_SIZE, squash=False)
     encoder, decoder = _masks(work, folder)
     yield from _both(encoder, folder, "house_mask_encoder", _encoder_feeds(views), KEEP_FLOAT["mask_encoder"])
     yield from _both(decoder, folder, "house_mask_decoder", _decoder_feeds(work, views), KEEP_FLOAT["mask_decoder"])
+
+
+PARTS = {"refined.pt": _pack_detector, "tags.pt": _pack_tagger, "masks.pt": _pack_masks}
 
 
 def _both(float_file: Path, folder: Path, name: str, feeds: Iterator[Feeds], keep: tuple[str, ...]) -> Iterator[str]:
@@ -77,8 +91,8 @@ def _views(calibration: Path, height: int, width: int, squash: bool) -> list[Sam
 
 
 def _detector(work: Path, folder: Path) -> Path:
-    network = read_average(work / "objects.pt", ObjectNetwork())
-    height, width = LARGE
+    network = read_refined(work / "refined.pt")
+    height, width = SIZES[-1]
     return export(
         Detector(network, height, width),
         {"images": torch.rand(1, 3, height, width), "text": torch.rand(1, 3, 256)},
@@ -95,7 +109,7 @@ def _detector_feeds(views: list[Sample]) -> Iterator[Feeds]:
 
 def _tagger(work: Path, folder: Path) -> Path:
     text = torch.from_numpy(TextEncoder().encode(NAMES))
-    network = read_average(work / "tags.pt", Tagger(ObjectNetwork(), text))
+    network = read_average(work / "tags.pt", Tagger(folded(ObjectNetwork()), text))
     return export(
         network, {"images": torch.rand(1, 3, TAG_SIZE, TAG_SIZE)}, ["logits"], folder / "float" / "house_tagger.onnx"
     )
@@ -138,7 +152,7 @@ def _best_f2(scores: NDArray[np.float64], shown: NDArray[np.float32]) -> float:
 
 def _masks(work: Path, folder: Path) -> tuple[Path, Path]:
     network = read_average(work / "masks.pt", MaskNetwork())
-    height, width = LARGE
+    height, width = MASK_SIZE
     encoder = export(
         network.encoder,
         {"images": torch.rand(1, 3, height, width), "depth": torch.rand(1, 1, height, width)},
@@ -164,7 +178,7 @@ def _encoder_feeds(views: list[Sample]) -> Iterator[Feeds]:
 
 def _decoder_feeds(work: Path, views: list[Sample]) -> Iterator[Feeds]:
     encoder = read_average(work / "masks.pt", MaskNetwork()).encoder
-    height, width = LARGE
+    height, width = MASK_SIZE
     for view in views:
         boxes = view.boxes[view.counts] / np.array([width, height, width, height], np.float32)
         if not len(boxes):

@@ -78,10 +78,13 @@ class Augment:
         squash: bool = False,
         varied: bool = True,
         common: float = 0.0,
+        with_depth: bool = True,
     ) -> None:
         """`squash`: the image fills the input whatever its aspect, as RAM++ does, else it is letterboxed; not `varied`:
         only the order is random. Views of classes that less than a share `common` of all views show come more often.
+        Not `with_depth`: samples hold none (0, 0); reading it takes memory that the pictures need.
         """
+        self._with_depth = with_depth
         self._varied = varied
         self._repeats = repeats(shards, common)
         self._shards, self._height, self._width, self._squash = shards, height, width, squash
@@ -104,8 +107,10 @@ class Augment:
         fill = (FILL,) * 3
         color = np.asarray(cv2.warpAffine(shard.color[k], centred, size, borderValue=fill), np.uint8)
         instance = np.asarray(cv2.warpAffine(shard.instance[k], centred, size, flags=cv2.INTER_NEAREST), np.uint16)
-        depth_mm = np.asarray(cv2.warpAffine(shard.depth[k], centred, size, flags=cv2.INTER_NEAREST), np.float32)
-        depth = depth_mm / np.float32(1000)
+        depth = np.zeros((0, 0), np.float32)
+        if self._with_depth:
+            depth = np.asarray(cv2.warpAffine(shard.depth[k], centred, size, flags=cv2.INTER_NEAREST), np.float32)
+            depth /= np.float32(1000)
         boxes, classes, counts, ids = self._place(shard.boxes[k], move)
         cells = shard.shown[instance[4::8, 4::8]].ravel()
         color = self._paint(color) if self._varied else color

@@ -17,7 +17,7 @@ from placegraph.tools.train.networks import ObjectNetwork, Tagger
 from placegraph.tools.train.objects import COMMON, images_of
 from placegraph.tools.train.samples import Augment, Sample, batches, load_shards
 
-SIZE = 320  # px, square: images are squashed, as RAM++ does
+SIZE = 448  # px, square: images are squashed, as RAM++ does
 BATCH = 16
 RATE = 3e-4
 
@@ -39,7 +39,7 @@ def train_tagger(
     torch.set_num_threads(threads)
     text = torch.from_numpy(TextEncoder().encode(NAMES))
     network = Tagger(copy.deepcopy(objects), text).to(memory_format=torch.channels_last)
-    stream = batches(Augment(load_shards(data), SIZE, SIZE, seed, squash=True, common=COMMON), BATCH)
+    stream = batches(Augment(load_shards(data), SIZE, SIZE, seed, squash=True, common=COMMON, with_depth=False), BATCH)
 
     def step(i: int) -> dict[str, Tensor]:
         samples = next(stream)

@@ -27,7 +27,7 @@ from placegraph.tools.house.space import free_grid
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 
-WIDTH, HEIGHT = 416, 312
+WIDTH, HEIGHT = 640, 480
 EVALUATION_SEEDS = range(9000, 10000)  # never trained on; `placegraph house` of such a seed is a test
 CALIBRATION_SEEDS = range(10000, 10100)  # for INT8 ranges and thresholds
 TRAINING_SEEDS = range(20000, 30000)

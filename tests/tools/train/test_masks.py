@@ -184,7 +184,7 @@ def write_shard(folder):
 
 def test_a_few_steps_of_training(tmp_path, monkeypatch):
     write_shard(tmp_path / "data" / "20000")  # half of its views show nothing
-    monkeypatch.setattr(masks, "LARGE", (64, 64))
+    monkeypatch.setattr(masks, "SIZE", (64, 64))
     monkeypatch.setattr(masks, "BATCH", 1)
     found = train_masks(tmp_path / "data", tmp_path / "masks.pt", steps=3, threads=1)
     assert not found.training

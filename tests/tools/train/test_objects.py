@@ -10,8 +10,17 @@ torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 from placegraph.models_onnx.text import TextEncoder  # noqa: E402
 from placegraph.tools.house.classes import CLASSES  # noqa: E402
 from placegraph.tools.train import objects  # noqa: E402
+from placegraph.tools.train.fold import folded  # noqa: E402
 from placegraph.tools.train.networks import ObjectNetwork  # noqa: E402
-from placegraph.tools.train.objects import OTHER_WORDS, OTHERS, Prompts, images_of, train_objects  # noqa: E402
+from placegraph.tools.train.objects import (  # noqa: E402
+    OTHER_WORDS,
+    OTHERS,
+    Prompts,
+    images_of,
+    read_refined,
+    refine_objects,
+    train_objects,
+)
 from placegraph.tools.train.samples import Sample  # noqa: E402
 from placegraph.tools.train.views import visible_boxes  # noqa: E402
 
@@ -109,8 +118,7 @@ def write_shard(folder, views=4, size=(48, 64)):
 
 def test_a_few_steps_of_training(tmp_path, monkeypatch):
     write_shard(tmp_path / "data" / "20000")
-    monkeypatch.setattr(objects, "SMALL", (64, 64))
-    monkeypatch.setattr(objects, "LARGE", (64, 96))
+    monkeypatch.setattr(objects, "FIRST_SIZES", ((64, 64), (64, 96)))
     monkeypatch.setattr(objects, "BATCH", 2)
     seen = []
 
@@ -122,11 +130,26 @@ def test_a_few_steps_of_training(tmp_path, monkeypatch):
 
     monkeypatch.setattr(ObjectNetwork, "forward", forward)
     words = len(CLASSES) + OTHERS
-    found = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=4, threads=1)
+    found = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=5, threads=1)
     small, large = ((2, 3, 64, 64), (2, words, 256)), ((2, 3, 64, 96), (2, words, 256))
-    assert seen == [small, small, small, large]  # .7 of the steps small
+    assert seen == [small, small, small, small, large]  # .8 of the steps small
     assert isinstance(found, ObjectNetwork) and not found.training
     assert all(torch.isfinite(value).all() for value in found.state_dict().values() if value.is_floating_point())
-    again = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=4, threads=1)
-    assert len(seen) == 4  # it was finished
+    again = train_objects(tmp_path / "data", tmp_path / "objects.pt", steps=5, threads=1)
+    assert len(seen) == 5  # it was finished
     torch.testing.assert_close(again.words.linear.weight, found.words.linear.weight)
+
+
+def test_refining_goes_on_without_batch_norm(tmp_path, monkeypatch):
+    write_shard(tmp_path / "data" / "20000")
+    monkeypatch.setattr(objects, "SIZES", ((64, 96), (96, 96)))
+    monkeypatch.setattr(objects, "BATCH", 2)
+    start = folded(ObjectNetwork())
+    before = start.backbone.stem[0][0].weight.detach().clone()
+    found = refine_objects(start, tmp_path / "data", tmp_path / "refined.pt", steps=3, threads=1)
+    assert not any(isinstance(module, torch.nn.BatchNorm2d) for module in found.modules())
+    assert not torch.equal(found.backbone.stem[0][0].weight, before)
+    image, text = torch.rand(1, 3, 64, 64), torch.rand(1, 3, 256)
+    with torch.no_grad():
+        for one, other in zip(read_refined(tmp_path / "refined.pt")(image, text), found(image, text), strict=True):
+            torch.testing.assert_close(one, other)

@@ -21,6 +21,7 @@ from placegraph.models_onnx.yolo import FAMILY as Yolo  # noqa: E402
 from placegraph.runtime.errors import ConfigError  # noqa: E402
 from placegraph.tools.house.classes import NAMES  # noqa: E402
 from placegraph.tools.train import pack as pack_module  # noqa: E402
+from placegraph.tools.train.fold import folded  # noqa: E402
 from placegraph.tools.train.masks import MaskNetwork  # noqa: E402
 from placegraph.tools.train.networks import MaskDecoder, MaskEncoder, ObjectNetwork, Tagger  # noqa: E402
 from placegraph.tools.train.pack import KEEP_FLOAT, pack  # noqa: E402
@@ -46,10 +47,10 @@ def write_shard(folder):
 
 def write_checkpoints(work):
     torch.manual_seed(0)
-    objects = ObjectNetwork()
+    objects = folded(ObjectNetwork())
     text = torch.from_numpy(TextEncoder().encode(NAMES))
     work.mkdir()
-    for name, network in (("objects", objects), ("tags", Tagger(objects, text)), ("masks", MaskNetwork())):
+    for name, network in (("refined", objects), ("tags", Tagger(objects, text)), ("masks", MaskNetwork())):
         torch.save({"average": network.state_dict()}, work / f"{name}.pt")
 
 
@@ -67,7 +68,8 @@ def packed(tmp_path_factory):
         return file
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pack_module, "LARGE", (64, 64))
+        patch.setattr(pack_module, "SIZES", ((64, 64),))
+        patch.setattr(pack_module, "MASK_SIZE", (64, 64))
         patch.setattr(pack_module, "TAG_SIZE", 64)
         patch.setattr(pack_module, "CALIBRATION_VIEWS", 4)
         patch.setattr(pack_module, "quantise", quantise)
@@ -75,11 +77,15 @@ def packed(tmp_path_factory):
     return folder / "work" / "onnx", lines, feeds, kept
 
 
-def test_what_is_not_trained_is_named(tmp_path):
-    for name in ("objects", "tags", "masks"):
-        with pytest.raises(ConfigError, match=rf"{name}\.pt: not trained yet: `placegraph train {name}`"):
-            next(pack(tmp_path, tmp_path))
-        (tmp_path / f"{name}.pt").touch()
+def test_what_is_trained_is_packed_alone(packed, tmp_path, monkeypatch):
+    with pytest.raises(ConfigError, match=r"refined\.pt, tags\.pt, masks\.pt: nothing is trained yet"):
+        next(pack(tmp_path, tmp_path))
+    folder, _, _, _ = packed
+    shutil.copy(folder.parent / "refined.pt", tmp_path)
+    monkeypatch.setattr(pack_module, "SIZES", ((64, 64),))
+    monkeypatch.setattr(pack_module, "quantise", lambda float_file, file, feeds, keep: shutil.copy(float_file, file))
+    lines = list(pack(tmp_path, folder.parent.parent / "calibration"))
+    assert [line.split(":")[0] for line in lines] == ["float/house_detector.onnx", "house_detector.onnx"]
 
 
 def test_all_files_are_written_and_said_with_their_sums(packed):
