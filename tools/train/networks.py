@@ -179,26 +179,29 @@ class Detector(nn.Module):
 
 
 class Tagger(nn.Module):
-    """Backbone and dense head of an ObjectNetwork with fixed words: logits of the whole image, RAM++ layout.
+    """An ObjectNetwork without its boxes, with fixed words: logits of the whole image, RAM++ layout.
 
-    The logit of a tag is a smooth maximum over cells, with its own scale and bias. Input is ImageNet-normalised.
+    The logit of a tag joins a smooth maximum over the dense head's cells and one over the detector's anchors: together
+    they name more than either. Input is ImageNet-normalised.
     """
 
     def __init__(self, network: ObjectNetwork, text: Tensor) -> None:
         super().__init__()
-        self.backbone, self.words, self.dense = network.backbone, network.words, network.dense
+        self.backbone, self.words = network.backbone, network.words
+        self.dense, self.texts = network.dense, network.texts
         self.register_buffer("text", text[None])  # (1, T, 256)
         self.register_buffer("mean", torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1))
         self.register_buffer("std", torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1))
-        self.gain = nn.Parameter(torch.ones(text.shape[0]))
+        self.gains = nn.Parameter(torch.full((2, text.shape[0]), 0.5))
         self.shift = nn.Parameter(torch.zeros(text.shape[0]))
 
     def forward(self, image: Tensor) -> Tensor:
         """(B, 3, S, S) normalised to (B, T) logits."""
-        features = self.backbone(image * self.std + self.mean)[0]
+        features = self.backbone(image * self.std + self.mean)
         words = self.words(self.text).expand(image.shape[0], -1, -1)
-        cells = self.dense(features, words)
-        return self.gain * torch.logsumexp(cells, dim=2) + self.shift
+        cells = self.dense(features[0], words)
+        anchors = torch.cat([head(f, words) for head, f in zip(self.texts, features, strict=True)], 2)
+        return self.gains[0] * torch.logsumexp(cells, 2) + self.gains[1] * torch.logsumexp(anchors, 2) + self.shift
 
 
 class MaskEncoder(nn.Module):

@@ -37,7 +37,7 @@ KEEP_FLOAT = {
         r"/network/(words|texts\.\d)/(?!embed).*",
         r"(/network)?/(Concat|Add)\w*",
     ),
-    "tagger": (r"/words/.*", r"/dense/(?!embed).*"),
+    "tagger": (r"/words/.*", r"/(dense|texts\.\d)/(?!embed).*", r"/(Concat|Add|Mul)\w*"),
     "mask_encoder": ("/Concat", "/Concat_4", r"/to2/to2\.0/.*"),
     "mask_decoder": ("/mask/Conv", r"/Add\w*", r"/Concat(_1|_2)?", "/enter/.*"),
 }

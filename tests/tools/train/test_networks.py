@@ -131,17 +131,18 @@ def test_detector_takes_any_number_of_words(network):
             assert (found[:, 2:4] > 0).all() and (found[:, 4:] >= 0).all() and (found[:, 4:] <= 1).all()
 
 
-def test_tagger_undoes_the_normalisation_and_pools_its_cells(network):
+def test_tagger_undoes_the_normalisation_and_pools_cells_and_anchors(network):
     text = torch.randn(5, 256)
     tagger = Tagger(network, text).eval()
     image = torch.rand(2, 3, 64, 64)
     mean, std = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])
     normal = (image - mean.view(3, 1, 1)) / std.view(3, 1, 1)
     with torch.no_grad():
-        tagger.gain.copy_(torch.linspace(0.5, 2, 5))
+        tagger.gains.copy_(torch.stack((torch.linspace(0.5, 2, 5), torch.linspace(0.7, 0.1, 5))))
         tagger.shift.copy_(torch.linspace(-1, 1, 5))
-        cells = network(image, text[None].expand(2, -1, -1))[2]
+        _, anchors, cells = network(image, text[None].expand(2, -1, -1))
         wanted = torch.linspace(0.5, 2, 5) * torch.logsumexp(cells, 2) + torch.linspace(-1, 1, 5)
+        wanted += torch.linspace(0.7, 0.1, 5) * torch.logsumexp(anchors, 2)
         entered = []
         hook = network.backbone.register_forward_pre_hook(lambda _, given: entered.append(given[0]))
         found = tagger(normal)

@@ -59,4 +59,4 @@ def test_a_few_steps_of_training(tmp_path, monkeypatch):
     for name, value in objects.state_dict().items():
         assert torch.equal(value, before[name]), f"{name}: the detector must stay as it is"
     assert not torch.equal(found.dense.embed[1].weight, objects.dense.embed[1].weight)
-    assert not torch.equal(found.gain, torch.ones(len(NAMES)))
+    assert not torch.equal(found.gains, torch.full((2, len(NAMES)), 0.5))
