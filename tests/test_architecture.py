@@ -27,7 +27,7 @@ ONLY_IMPORTERS = {
     "llama_cpp": ("nodes/grounding/llm.py",),
     "wordllama": ("models_onnx/text.py",),
     "depthai": ("nodes/camera/oak.py",),
-    "onnx": ("tools/drawn_scene_network.py", "tools/train/export.py"),
+    "onnx": ("tools/drawn_scene_network.py", "tools/train/export.py", "tools/train/fold.py"),
     "torch": ("tools/train/",),
     "embreex": ("tools/house/",),
     "typer": ("tools/",),

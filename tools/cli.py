@@ -21,6 +21,7 @@ from placegraph.tools import (
     record,
     references,
     replay,
+    rooms,
     run,
     view,
 )
@@ -42,6 +43,7 @@ COMMANDS: tuple[Callable[..., None], ...] = (
     record.record,
     replay.replay,
     view.view,
+    rooms.rooms,
     evaluate.evaluate,
     perceive.perceive,
     doctor.doctor,

@@ -96,12 +96,16 @@ def find_rooms(
     grid = floor_grid(np.concatenate((points_world[:, :2], free_points_world[:, :2])), config.cell_m)
     walls = wall_mask(points_world, span, grid, config)
     observed = observed_mask(points_world, free_points_world, free_cell_m, grid, config)
-    labels = segment_rooms(walls, observed, config)
-    areas = [labels == i for i in range(1, int(labels.max()) + 1)]
-    areas = sorted(areas, key=lambda mask: -int(mask.sum()))  # stable: equals keep the order of their labels
-    large = [mask for mask in areas if mask.sum() * config.cell_m**2 >= config.room_min_m2]
-    masks = large or areas[:1] or [observed]
-    return grid, [RoomArea(mask, grid.outline(mask)) for mask in masks]
+    found = areas_of(segment_rooms(walls, observed, config), grid, config)
+    return grid, found or [RoomArea(observed, grid.outline(observed))]
+
+
+def areas_of(labels: I32, grid: Grid, config: RoomConfig) -> list[RoomArea]:
+    """Rooms of a label image, largest first, without those under `room_min_m2`; of only such ones the largest."""
+    masks = [labels == i for i in range(1, int(labels.max()) + 1)]
+    masks = sorted(masks, key=lambda mask: -int(mask.sum()))  # stable: equals keep the order of their labels
+    large = [mask for mask in masks if mask.sum() * config.cell_m**2 >= config.room_min_m2]
+    return [RoomArea(mask, grid.outline(mask)) for mask in large or masks[:1]]
 
 
 def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomConfig) -> Bool:
