@@ -40,6 +40,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	$(PIP_INSTALL) --editable '.[dev,demo,oak]'
+	$(PIP_INSTALL) --no-deps spark-dsg  # a test reads our export with it; its plotting packages are not needed
 	touch $@
 
 clean:

@@ -30,6 +30,7 @@ ONLY_IMPORTERS = {
     "onnx": ("tools/drawn_scene_network.py", "tools/train/export.py", "tools/train/fold.py"),
     "torch": ("tools/train/",),
     "embreex": ("tools/house/",),
+    "trimesh": ("tools/export/glb.py",),
     "typer": ("tools/",),
     "rich": ("tools/",),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+import re
 import subprocess
 import time
 from importlib import metadata
@@ -192,6 +193,21 @@ def read_trajectory(path: Path) -> dict[int, NDArray[np.float64]]:
         except ValueError as error:
             raise SchemaError(f"{path}:{number}: {error}") from None
     return found
+
+
+def read_cloud(folder: Path) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Points (P, 3) in metres, world frame, and colours (P, 3) of a map folder; raises SchemaError."""
+    path = folder / CLOUD
+    try:
+        head, _, body = path.read_bytes().partition(b"end_header\n")
+    except OSError as error:
+        raise SchemaError(f"{path}: cannot read: {error.strerror}") from None
+    dtype = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
+    count = re.search(rb"element vertex (\d+)\n", head)
+    if count is None or len(body) != int(count[1]) * dtype.itemsize:
+        raise SchemaError(f"{path}: not a cloud that `placegraph run` wrote, or cut short")
+    rows = np.frombuffer(body, dtype)
+    return rows["xyz"].astype(np.float32), rows["rgb"].astype(np.uint8)
 
 
 def _write_ply(path: Path, xyz: NDArray[np.float32], extra: dict[str, NDArray[Any]]) -> None:

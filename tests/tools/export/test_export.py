@@ -1,0 +1,106 @@
+"""Each format is read back by the package that it is for, or by a plain reader of it. (command)"""
+
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.tools.export import dsg
+from placegraph.tools.map_folder import read_cloud
+from placegraph.tools.rooms import read_map
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def graph(mapped):
+    return SceneGraph.load(mapped / "graph.json")
+
+
+def test_spark_dsg_loads_every_node_box_name_and_edge(cli, mapped, graph, tmp_path):
+    spark_dsg = pytest.importorskip("spark_dsg", reason="`make test` installs it")
+    out = tmp_path / "dsg.json"
+    assert cli("export", mapped, "dsg", "--out", out).code == 0
+    found = spark_dsg.DynamicSceneGraph.load(str(out))
+    assert found.num_nodes() == len(graph.nodes) and found.num_edges() == len(graph.nodes) - 1
+    for node in graph.nodes.values():
+        there = found.get_node(dsg.symbol(node.id))
+        assert there.id.str(False) == f"{node.id[0]}({node.id[1:]})" and there.layer.layer == dsg.LAYERS[node.layer]
+        assert there.attributes.name == node.name
+        np.testing.assert_allclose(there.attributes.position, node.center, atol=1e-3)
+        if node.parent:
+            assert found.has_edge(dsg.symbol(node.parent), there.id.value)
+    names = found.get_labelspace(dsg.LAYERS["object"], 0).labels_to_names
+    for thing in graph.layer("object"):
+        there = found.get_node(dsg.symbol(thing.id)).attributes
+        assert names[there.semantic_label] == thing.name
+        np.testing.assert_allclose(there.bounding_box.dimensions, thing.oriented_box[3:6], atol=2e-3)
+        x, y = there.bounding_box.world_R_center[:2, 0]
+        assert np.arctan2(y, x) == pytest.approx(thing.oriented_box[6], abs=2e-3)
+
+
+def test_the_plan_draws_every_place_and_object_where_it_is(cli, mapped, graph, tmp_path):
+    out = tmp_path / "plan.svg"
+    assert cli("export", mapped, "svg", "--out", out).code == 0
+    root = ElementTree.parse(out).getroot()
+    drawn = {shape.find(f"{SVG}title").text.split()[0]: shape for shape in root.iter(f"{SVG}polygon")}
+    assert set(drawn) == {node.id for node in graph.nodes.values() if node.layer in ("room", "location", "object")}
+    groups = root.findall(f"{SVG}g")
+    assert len(groups) == len(graph.layer("floor"))
+    width, height = (float(v) for v in root.get("viewBox").split()[2:])
+    for group in groups:
+        x, y = (float(v) for v in group.get("transform").split("(")[1].split(")")[0].split())
+        for shape in group.findall(f"{SVG}polygon"):
+            points = np.array([pair.split(",") for pair in shape.get("points").split()], float)
+            on_sheet = np.array([x, y]) + points * [1, -1]
+            assert (on_sheet >= 0).all() and (on_sheet <= [width, height]).all()
+
+
+def test_ros_maps_have_walls_and_free_rooms_in_the_world_frame(cli, mapped, graph, tmp_path):
+    out = tmp_path / "ros"
+    assert cli("export", mapped, "ros", "--out", out).code == 0
+    floors = graph.layer("floor")
+    assert sorted(path.name for path in out.iterdir()) == sorted(
+        f"{floor.id}.{suffix}" for floor in floors for suffix in ("pgm", "yaml")
+    )
+    plan = read_map(out / f"{floors[0].id}.yaml")
+    assert plan.occupied.any() and plan.free.any() and not (plan.occupied & plan.free).any()
+    room = max(graph.layer("room"), key=lambda node: float(np.prod(node.box[1] - node.box[0])))
+    rows, columns = np.nonzero(plan.free[::-1])
+    free = np.array(plan.origin) + (np.stack((columns, rows), 1) + 0.5) * plan.resolution
+    inside = ((free > room.box[0, :2]) & (free < room.box[1, :2])).all(axis=1)
+    assert inside.mean() > 0.9
+    again = cli("export", mapped, "ros", "--out", out)
+    assert again.code == 2 and "not an empty folder" in again.err
+
+
+def test_a_glb_holds_the_cloud_and_a_named_box_for_each_object(cli, mapped, graph, tmp_path):
+    trimesh = pytest.importorskip("trimesh", reason="extra `export`")
+    out = tmp_path / "map.glb"
+    assert cli("export", mapped, "glb", "--out", out).code == 0
+    scene = trimesh.load(out)
+    xyz, _ = read_cloud(mapped)
+    cloud = scene.geometry["cloud"]
+    assert len(cloud.vertices) == len(xyz)
+    things = graph.layer("object")
+    assert {f"{thing.id} {thing.name}" for thing in things} == set(scene.geometry) - {"cloud"}
+    placed, _ = scene.graph.get("cloud")
+    world = np.asarray(cloud.vertices) @ placed[:3, :3].T + placed[:3, 3]
+    np.testing.assert_allclose(world[:, 1], xyz[:, 2], atol=1e-4)  # glTF's up is y
+
+
+def test_equal_maps_give_equal_bytes_and_wrong_input_is_named(cli, mapped, tmp_path):
+    for kind in ("dsg", "svg"):
+        for name in ("one", "two"):
+            assert cli("export", mapped, kind, "--out", tmp_path / name).code == 0
+        assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+    absent = cli("export", tmp_path / "nowhere", "svg", "--out", tmp_path / "a.svg")
+    assert absent.code == 1 and "nowhere" in absent.err
+    blocked = cli("export", mapped, "svg", "--out", tmp_path / "no" / "folder" / "a.svg")
+    assert blocked.code == 2 and "cannot write there" in blocked.err
+    (tmp_path / "bare").mkdir()
+    (tmp_path / "bare" / "graph.json").write_text((mapped / "graph.json").read_text())
+    (tmp_path / "bare" / "cloud.ply").write_bytes(b"ply\nelement vertex 3\nend_header\n")
+    cut = cli("export", tmp_path / "bare", "ros", "--out", tmp_path / "c")
+    assert cut.code == 1 and "cut short" in cut.err

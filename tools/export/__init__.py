@@ -1,0 +1,46 @@
+"""`placegraph export`: a map in the formats that other systems read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.tools.export import dsg, glb, ros, svg
+from placegraph.tools.map_folder import find_graph
+
+
+class Format(StrEnum):
+    """What a map can be written as."""
+
+    DSG = "dsg"  # JSON that spark_dsg loads
+    SVG = "svg"  # floor plans
+    GLB = "glb"  # points, objects and rooms in 3D
+    ROS = "ros"  # a folder: an occupancy map of each floor for map_server
+
+
+WRITERS: dict[Format, Callable[[Path, SceneGraph, Path], list[Path]]] = {
+    Format.DSG: dsg.write,
+    Format.SVG: svg.write,
+    Format.GLB: glb.write,
+    Format.ROS: ros.write,
+}
+
+
+def export(
+    map_folder: Annotated[Path, typer.Argument(metavar="MAP", help="A folder that `placegraph run` wrote.")],
+    kind: Annotated[Format, typer.Argument(metavar="dsg|svg|glb|ros")],
+    out: Annotated[Path, typer.Option(help="File to write; for ros a folder.")],
+) -> None:
+    """Write a map for others: spark_dsg (Hydra) JSON, SVG floor plans, a GLB scene, ROS occupancy maps."""
+    graph = SceneGraph.load(find_graph(map_folder))
+    try:
+        for path in WRITERS[kind](map_folder, graph, out):
+            print(path)
+    except OSError as error:
+        raise ConfigError(f"--out {out}: cannot write there: {error.strerror}") from None
