@@ -1,4 +1,4 @@
-"""Networks without batch norm, and the packaged weights as a start.
+"""Networks as they are refined and packed: without batch norm, with a table of words; the packaged weights as a start.
 
 Batch norm takes half of a training step on a CPU. Once a network is trained it is folded into the convolutions
 (exactly, as every export does), and training goes on without it.
@@ -16,13 +16,20 @@ from onnx import numpy_helper
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+from placegraph.models_onnx.text import TextEncoder
 from placegraph.runtime.errors import ModelError
 from placegraph.tools.train.networks import Conv, ObjectNetwork, TextHead
+from placegraph.tools.train.words import KNOWN_WORDS, KnownWords, Words
 
 
 def folded(network: ObjectNetwork) -> ObjectNetwork:
-    """The same function with every batch norm folded into the convolution before it; changes `network` itself."""
+    """The same network with every batch norm folded into the convolution before it, and KnownWords in place of Words.
+
+    Changes and returns `network` itself; gives the same for every word of the training.
+    """
+    assert isinstance(network.words, Words), "already folded"
     network.eval()
+    network.words = KnownWords(network.words, torch.from_numpy(TextEncoder().encode(KNOWN_WORDS)))
     for module in list(network.modules()):
         if isinstance(module, Conv):
             module[0], module[1] = fuse_conv_bn_eval(module[0], module[1]), nn.Identity()

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-TEXT = 256  # numbers of a WordLlama vector
-EMBEDDING = 96  # numbers in which pixels and words meet
+from placegraph.tools.train.words import EMBEDDING, KnownWords, Words
+
 STRIDES = (8, 16, 32)
 
 
@@ -119,20 +119,6 @@ class TextHead(nn.Module):
         return self.scale * torch.matmul(words, cells) + self.bias
 
 
-class Words(nn.Module):
-    """WordLlama vectors to the space where words and pixels meet; starts close to a plain projection."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.linear = nn.Linear(TEXT, EMBEDDING)
-        self.hidden = nn.Sequential(nn.Linear(TEXT, 192), nn.ReLU(), nn.Linear(192, EMBEDDING))
-
-    def forward(self, text: Tensor) -> Tensor:
-        """(B, N, 256) to (B, N, EMBEDDING), unit rows."""
-        mixed = self.linear(text) + self.hidden(text)
-        return mixed / torch.sqrt((mixed * mixed).sum(dim=-1, keepdim=True) + 1e-6)
-
-
 class ObjectNetwork(nn.Module):
     """Detector, with a dense head beside it from which the tagger is made.
 
@@ -142,7 +128,7 @@ class ObjectNetwork(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.backbone = Backbone()
-        self.words = Words()
+        self.words: Words | KnownWords = Words()
         self.boxes = nn.ModuleList(nn.Sequential(Conv(c, 64), nn.Conv2d(64, 4, 1)) for c in Backbone.WIDTHS)
         self.texts = nn.ModuleList(TextHead(c) for c in Backbone.WIDTHS)
         self.dense = TextHead(Backbone.WIDTHS[0])

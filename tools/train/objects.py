@@ -15,6 +15,7 @@ from placegraph.tools.train.detection import losses, targets_of
 from placegraph.tools.train.fold import folded
 from placegraph.tools.train.networks import ObjectNetwork
 from placegraph.tools.train.samples import Augment, Sample, batches, load_shards
+from placegraph.tools.train.words import OTHER_WORDS
 
 # height and width in px of most steps, where they cost less, and of the last ones; the network runs at the very last
 FIRST_SIZES = (256, 320), (320, 416)
@@ -26,13 +27,7 @@ FIRST_RATE, RATE = 1.5e-3, 8e-4
 TEXT_NOISE = (
     0.03  # sigma added to each number of a word's vector (unit length, 256 numbers): words nearby mean the same
 )
-OTHER_WORDS = (
-    "car", "dog", "tree", "person", "cat", "horse", "airplane", "boat", "traffic light", "bird", "cow", "pizza",
-    "banana", "umbrella", "tie", "skateboard", "kite", "knife", "fork", "truck", "bus", "train", "mountain", "river",
-    "fence", "phone", "hair dryer", "toothbrush", "scissors", "surfboard", "carrot", "cake", "elephant", "bridge",
-    "flag", "hat",
-)  # fmt: skip  # never shown: the network must also say no
-OTHERS = 10  # of them in a batch
+OTHERS = 10  # of the words of things never shown, in a batch
 
 
 class Prompts:

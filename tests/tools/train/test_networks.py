@@ -14,7 +14,6 @@ from placegraph.tools.train.networks import (  # noqa: E402
     MaskEncoder,
     ObjectNetwork,
     Tagger,
-    Words,
     anchors,
 )
 
@@ -77,12 +76,6 @@ def test_every_weight_learns():
     sum((part**2).sum() for part in outputs).backward()
     dead = [name for name, p in network.named_parameters() if p.grad is None or not torch.isfinite(p.grad).all()]
     assert dead == []
-
-
-def test_words_are_unit_rows_also_for_a_text_without_letters():
-    rows = Words()(torch.cat((torch.randn(1, 5, 256), torch.zeros(1, 1, 256)), 1))
-    assert rows.shape == (1, 6, 96)
-    torch.testing.assert_close(rows.norm(dim=-1), torch.ones(1, 6), atol=1e-3, rtol=0)
 
 
 def test_a_word_is_scored_alone(network):

@@ -13,7 +13,6 @@ from placegraph.tools.train import objects  # noqa: E402
 from placegraph.tools.train.fold import folded  # noqa: E402
 from placegraph.tools.train.networks import ObjectNetwork  # noqa: E402
 from placegraph.tools.train.objects import (  # noqa: E402
-    OTHER_WORDS,
     OTHERS,
     Prompts,
     images_of,
@@ -23,6 +22,7 @@ from placegraph.tools.train.objects import (  # noqa: E402
 )
 from placegraph.tools.train.samples import Sample  # noqa: E402
 from placegraph.tools.train.views import visible_boxes  # noqa: E402
+from placegraph.tools.train.words import OTHER_WORDS  # noqa: E402
 
 torch.set_num_threads(1)
 
