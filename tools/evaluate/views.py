@@ -14,7 +14,7 @@ from placegraph.tools.evaluate.detection import TrueBoxes
 from placegraph.tools.house.build import generator_version
 from placegraph.tools.house.classes import NAMES
 from placegraph.tools.train.samples import LEAST_SHARE, Shard, load_shards
-from placegraph.tools.train.views import EVALUATION_SEEDS, render_houses
+from placegraph.tools.train.views import EVALUATION_SEEDS, HEIGHT, WIDTH, render_houses
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
@@ -75,8 +75,8 @@ def evaluation_shards(houses: int, views: int, data: Path) -> list[Shard]:
 
 
 def shard_folder(views: int, data: Path) -> Path:
-    """Where shards lie: apart for each number of views and each version of the generator."""
-    return data / f"{generator_version()}-{views}"
+    """Where shards lie: apart for each number and size of views and each version of the generator."""
+    return data / f"{generator_version()}-{views}-{WIDTH}x{HEIGHT}"
 
 
 def evaluation_views(shards: Sequence[Shard]) -> Iterator[EvaluationView]:

@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 import torch
 from torch import Tensor, nn
 
+from placegraph.runtime.errors import ConfigError
+
 Network = TypeVar("Network", bound=nn.Module)
 
 AVERAGE = 0.9995  # of the averaged weights, reached slowly
@@ -63,7 +65,9 @@ def fit(
 
 
 def read_average(checkpoint: Path, network: Network) -> Network:
-    """Load the averaged weights of a checkpoint into a network of the same kind."""
+    """Load the averaged weights of a checkpoint into a network of the same kind; raises ConfigError when absent."""
+    if not checkpoint.exists():
+        raise ConfigError(f"{checkpoint}: not there; an earlier step of `placegraph train` writes it")
     network.load_state_dict(torch.load(checkpoint, weights_only=True)["average"])
     return network.eval()
 

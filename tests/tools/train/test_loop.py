@@ -8,6 +8,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
+from placegraph.runtime.errors import ConfigError  # noqa: E402
 from placegraph.tools.train import loop  # noqa: E402
 from placegraph.tools.train.loop import fit, read_average  # noqa: E402
 
@@ -162,3 +163,8 @@ def test_only_matrices_decay(tmp_path):
     after = network.state_dict()
     assert after["0.weight"].norm() < 0.95 * before["0.weight"].norm()
     assert torch.equal(after["0.bias"], before["0.bias"]) and torch.equal(after["1.weight"], before["1.weight"])
+
+
+def test_a_checkpoint_that_is_absent_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"absent\.pt: not there"):
+        read_average(tmp_path / "absent.pt", make_network())
