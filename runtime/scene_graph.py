@@ -71,6 +71,11 @@ class Node:
         """Middle of the box, (3,) metres, world frame."""
         return np.asarray(self.box.mean(axis=0))
 
+    @property
+    def turned_box(self) -> tuple[float, ...]:
+        """The oriented box; of a node without one its box, not turned, in the same seven numbers."""
+        return self.oriented_box or (*self.center.tolist(), *(self.box[1] - self.box[0]).tolist(), 0.0)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SceneGraph:

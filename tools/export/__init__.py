@@ -20,7 +20,7 @@ class Format(StrEnum):
 
     DSG = "dsg"  # JSON that spark_dsg loads
     SVG = "svg"  # floor plans
-    GLB = "glb"  # points, objects and rooms in 3D
+    GLB = "glb"  # points and boxes of objects in 3D
     ROS = "ros"  # a folder: an occupancy map of each floor for map_server
 
 

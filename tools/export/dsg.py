@@ -38,11 +38,7 @@ def document(graph: SceneGraph) -> dict[str, Any]:
         "layer_names": {NAMES[layer]: key for layer, key in keys.items()},
         "metadata": {"labelspaces": {f"_l{LAYERS['object']}p0": [[k, name] for name, k in labels.items()]}},
         "nodes": [keys[n.layer] | {"id": symbol(n.id), "attributes": _attributes(n, labels)} for n in nodes],
-        "edges": [
-            {"source": symbol(n.parent), "target": symbol(n.id), "info": _edge()}
-            for n in nodes
-            if n.layer != "building"
-        ],
+        "edges": [{"source": symbol(n.parent), "target": symbol(n.id), "info": _edge()} for n in nodes if n.parent],
     }
 
 
@@ -84,19 +80,17 @@ def _attributes(node: Node, labels: dict[str, int]) -> dict[str, Any]:
             "semantic_label": labels[node.name],
             "mesh_connections": [],
             "registered": False,
-            "world_R_object": _turn(node.oriented_box[6] if node.oriented_box else 0.0),
+            "world_R_object": _turn(node.turned_box[6]),
         }
     return found
 
 
 def _box(node: Node) -> dict[str, Any]:
-    # sizes and turn of the oriented box; without one, the plain box
-    x, y, z, *size, yaw = node.oriented_box or (*node.center, *(node.box[1] - node.box[0]), 0.0)
     return {
         "type": "RAABB" if node.oriented_box else "AABB",
-        "world_P_center": _numbers((x, y, z)),
-        "dimensions": _numbers(size),
-        "world_R_center": _turn(yaw),
+        "world_P_center": _numbers(node.turned_box[:3]),
+        "dimensions": _numbers(node.turned_box[3:6]),
+        "world_R_center": _turn(node.turned_box[6]),
     }
 
 

@@ -35,12 +35,9 @@ def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
 
 
 def _placed(thing: Node) -> tuple[np.ndarray, np.ndarray]:
-    """Size (3,) and pose (4, 4) of an object's box; the one turned about z where there is one."""
+    """Size (3,) and pose (4, 4) of an object's box, turned about z."""
+    centre, size, yaw = thing.turned_box[:3], thing.turned_box[3:6], thing.turned_box[6]
     pose = np.eye(4)
-    if not thing.oriented_box:
-        pose[:3, 3] = thing.center
-        return thing.box[1] - thing.box[0], pose
-    centre, size, yaw = thing.oriented_box[:3], thing.oriented_box[3:6], thing.oriented_box[6]
     pose[:3, 3] = centre
     pose[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     return np.array(size), pose

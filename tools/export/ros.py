@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from placegraph.nodes.hierarchy.rooms import Grid, floor_grid
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.map_folder import read_cloud
+from placegraph.tools.map_folder import prepare, read_cloud
 
 CELL_M = 0.05
 CLEAR_M, TALL_M = 0.12, 1.6  # above the floor: noise of the floor itself below, lamps and lintels above
@@ -24,9 +24,7 @@ FREE, OCCUPIED, UNKNOWN = 254, 0, 205
 def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
     """Write a folder. Raises ConfigError when it is not empty, SchemaError when the map holds no cloud."""
     xyz, _ = read_cloud(folder)
-    if out.is_file() or (out.is_dir() and any(out.iterdir())):
-        raise ConfigError(f"--out {out}: exists and is not an empty folder")
-    out.mkdir(parents=True, exist_ok=True)
+    prepare(out)
     written = []
     for floor in graph.layer("floor"):
         grid, image = occupancy(xyz, floor, graph.descendants(floor.id, "room"))

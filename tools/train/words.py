@@ -31,8 +31,7 @@ class Words(nn.Module):
 
     def forward(self, text: Tensor) -> Tensor:
         """(B, N, 256) to (B, N, EMBEDDING), unit rows."""
-        mixed = self.linear(text) + self.hidden(text)
-        return mixed / torch.sqrt((mixed * mixed).sum(dim=-1, keepdim=True) + 1e-6)
+        return _unit_rows(self.linear(text) + self.hidden(text))
 
 
 class KnownWords(nn.Module):
@@ -52,5 +51,8 @@ class KnownWords(nn.Module):
     def forward(self, text: Tensor) -> Tensor:
         """(B, N, 256) unit rows to (B, N, EMBEDDING), unit rows."""
         near = torch.softmax(SHARPNESS * torch.matmul(text, self.known), dim=-1)
-        mixed = torch.matmul(near, self.meaning)
-        return mixed / torch.sqrt((mixed * mixed).sum(dim=-1, keepdim=True) + 1e-6)
+        return _unit_rows(torch.matmul(near, self.meaning))
+
+
+def _unit_rows(rows: Tensor) -> Tensor:
+    return rows / torch.sqrt((rows * rows).sum(dim=-1, keepdim=True) + 1e-6)
