@@ -121,9 +121,10 @@ def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
         raise ConfigError(f"expected one source (camera or playback), found {', '.join(sources) or 'none'}")
     source = nodes[sources[0]]
     assert isinstance(source, Source)
-    context = base.model_copy(update={"lossless": source.is_lossless()})
-    for node in nodes.values():
-        node.context = context
+    given = sorted({kind.__name__ for node in nodes.values() for kind in node.gives})
+    context = base.model_copy(update={"lossless": source.is_lossless(), "given": tuple(given)})
+    # once more, now that it is known what is given: some nodes take a kind only if another gives it
+    nodes = {name: build_node(name, settings, context) for name, settings in config.nodes.items()}
     dataflow = Dataflow(config, context, {name: nodes[name] for name in _order(nodes)})
     _check_wiring(dataflow)
     return dataflow

@@ -163,6 +163,15 @@ class Keyframe(Message):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Correction(Message):
+    """Where the pose graph puts a keyframe; one for each. After a loop was closed also where it now puts earlier ones."""
+
+    world_from_camera: F64 = array("float64", (4, 4), unit="m", frame="world")
+    moved_frame_ids: I64 = array("int64", ("N",), unit="1")  # of earlier keyframes, ascending; N = 0: none moved
+    moved_world_from_camera: F64 = array("float64", ("N", 4, 4), unit="m", frame="world")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LastKeyframe(Message):
     """No further keyframe will come; `frame_id` is that of the last one, -1 if there was none."""
 

@@ -89,6 +89,7 @@ class Context(BaseModel):
     threads: int = 1  # for each library that has threads of its own
     model_dirs: tuple[str, ...] = ()  # where weights are looked for, after the packaged ones
     out_dir: str = ""  # the run's folder; only sinks write
+    given: tuple[str, ...] = ()  # names of the kinds that some node of the dataflow gives, for those with a choice
 
 
 def plugin(package: str, name: str, export: str, what: str) -> Any:

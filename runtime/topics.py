@@ -36,6 +36,7 @@ TOPICS: dict[type[m.Message], Topic] = {
         Topic(m.End, "end", window=8, newest=0, rate_hz=0.0, recorded=True),
         Topic(m.Pose, "pose", window=64, newest=0, rate_hz=10.0, recorded=True),
         Topic(m.Keyframe, "keyframe", window=6, newest=0, rate_hz=1.0, recorded=True),
+        Topic(m.Correction, "correction", window=6, newest=0, rate_hz=0.0, recorded=True),
         Topic(m.LastKeyframe, "last_keyframe", window=6, newest=0, rate_hz=0.0, recorded=True),
         Topic(m.Tags, "tags", window=6, newest=0, rate_hz=1.0, recorded=True),
         Topic(m.Detections, "detections", window=6, newest=0, rate_hz=1.0, recorded=True),
