@@ -43,6 +43,15 @@ def inverse(b_from_a: F64) -> F64:
     return a_from_b
 
 
+def nearest_rigid(matrix: F64) -> F64:
+    """The rigid (4, 4) transform nearest to a product of many: `inverse` transposes, so rounding would grow."""
+    u, _, vt = np.linalg.svd(matrix[:3, :3])
+    made = np.eye(4)
+    made[:3, :3] = u @ np.diag((1.0, 1.0, np.linalg.det(u @ vt))) @ vt
+    made[:3, 3] = matrix[:3, 3]
+    return made
+
+
 def is_rigid(matrix: F64, tolerance: float = 1e-3) -> bool:
     """Whether a (4, 4) matrix is a finite rotation and translation."""
     if not np.isfinite(matrix).all() or not np.allclose(matrix[3], (0, 0, 0, 1), atol=tolerance):

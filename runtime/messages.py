@@ -139,8 +139,8 @@ class Pose(Message):
 
     world_from_camera: F64 = array("float64", (4, 4), unit="m", frame="world")
     trusted: bool  # False: do not put this frame into the map
-    quality: float  # share of scan points with a map point nearby, 0..1
-    residual_m: float  # median distance of those points to the map; NaN when nothing was compared
+    quality: float  # share of what was compared that agrees, 0..1: tracked corners, or by shape points on the map
+    residual_m: float  # by shape: median distance of those points to the map; NaN when nothing was compared
     innovation_m: float  # how far registration moved the pose from its prediction
     reason: str  # why not trusted; "" when trusted
 

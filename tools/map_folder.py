@@ -18,8 +18,9 @@ from pydantic import ValidationError
 from placegraph.runtime.config import Dataflow, RunConfig
 from placegraph.runtime.errors import ConfigError, SchemaError
 from placegraph.runtime.geometry import quaternion_xyzw
-from placegraph.runtime.messages import End, Graph, Map, Message, PlaceNames, Pose
+from placegraph.runtime.messages import Correction, End, Graph, Map, Message, PlaceNames, Pose
 from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.tools.corrected import CorrectedKeyframes
 
 GRAPH, CLOUD, OBJECTS, TRAJECTORY, RUN = "graph.json", "cloud.ply", "objects.ply", "trajectory.txt", "run.json"
 PACKAGES = (
@@ -63,14 +64,17 @@ class Collector:
         self.ended = False
         self._frames_of_source = 0
         self.clock = Clock()
-        self.poses: list[Pose] = []
+        self._odometry: list[Pose] = []
+        self._corrections = CorrectedKeyframes()
         self.map: Map | None = None
         self.graph: Graph | None = None
 
     def add(self, message: Message) -> None:
-        """Take any message; keeps poses, the newest map and the newest graph."""
+        """Take any message; keeps poses and corrections, the newest map and the newest graph."""
         if isinstance(message, Pose):
-            self.poses.append(message)
+            self._odometry.append(message)
+        elif isinstance(message, Correction):
+            self._corrections.add(message)
         elif isinstance(message, Map):
             self.map = message
         elif isinstance(message, Graph):
@@ -79,9 +83,14 @@ class Collector:
             self.ended, self._frames_of_source = True, message.frames
 
     @property
+    def poses(self) -> list[Pose]:
+        """All poses so far, as corrected so far."""
+        return self._corrections.correct(self._odometry)
+
+    @property
     def frames(self) -> int:
         """How many frames the source gave; of a recording that is played back, those it knows a pose of."""
-        return self._frames_of_source or len(self.poses)
+        return self._frames_of_source or len(self._odometry)
 
     @property
     def complete(self) -> bool:

@@ -19,7 +19,7 @@ from placegraph.runtime.errors import ConfigError, PlacegraphError
 from placegraph.runtime.health import StepStats
 from placegraph.runtime.inline import Inline
 from placegraph.runtime.launch import Launcher
-from placegraph.runtime.messages import End, Frame, Graph, Health, Keyframe, Map, Message, Pose
+from placegraph.runtime.messages import Correction, End, Frame, Graph, Health, Keyframe, Map, Message, Pose
 from placegraph.tools.evaluate import against_given
 from placegraph.tools.map_folder import GRAPH, Collector, next_folder, prepare, write_run
 from placegraph.tools.progress import Progress
@@ -180,7 +180,7 @@ def _run_processes(
                 progress.add(message)
 
     with _interrupts() as interrupts, Launcher(dataflow, folder) as launcher:
-        for kind in (Pose, Map, Graph, Health, End):
+        for kind in (Pose, Correction, Map, Graph, Health, End):
             launcher.observe(kind, messages.put)
         collector.clock.begin()
         launcher.start(lambda: bool(interrupts))
@@ -214,15 +214,15 @@ def _run_processes(
 def _summary(dataflow: Dataflow, collector: Collector, nodes: list[Health]) -> dict[str, Any]:
     from placegraph.runtime.scene_graph import SceneGraph
 
-    frames = collector.frames
-    estimated = {pose.stamp_ns: pose.world_from_camera[:3, 3] for pose in collector.poses if pose.trusted}
+    frames, poses = collector.frames, collector.poses
+    estimated = {pose.stamp_ns: pose.world_from_camera[:3, 3] for pose in poses if pose.trusted}
     summary: dict[str, Any] = {
         "start_s": round(collector.clock.start_s, 2),
         "mapping_s": round(collector.clock.mapping_s, 2),
         "frames": frames,
         "frames_per_s": round(frames / collector.clock.mapping_s, 2) if frames else 0.0,
         "keyframes": collector.map.keyframes if collector.map else 0,
-        "untrusted_poses": sum(not pose.trusted for pose in collector.poses),
+        "untrusted_poses": sum(not pose.trusted for pose in poses),
         "trajectory": against_given(estimated, dataflow.source.given_poses()),
         "nodes": {
             n.node: {

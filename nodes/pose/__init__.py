@@ -1,4 +1,4 @@
-"""Depth to cloud, odometry in a world with z up, and a judgement whether to believe it."""
+"""Odometry in a world with z up, and a judgement whether to believe it."""
 
 from __future__ import annotations
 
@@ -6,25 +6,32 @@ import logging
 from collections.abc import Sequence
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.pose import gravity
 from placegraph.nodes.pose.odometry import Odometry, OdometryConfig
+from placegraph.nodes.pose.rgbd import RgbdConfig, RgbdOdometry
+from placegraph.nodes.pose.visual import View
 from placegraph.runtime.geometry import backproject, is_rigid
 from placegraph.runtime.messages import End, Frame, Message, Pose
 from placegraph.runtime.node import Context, Node
 
 logger = logging.getLogger(__name__)
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
 class PoseConfig(OdometryConfig):
     """What gives the pose, and the cloud it is made from."""
 
-    method: Literal["kiss_icp", "given"] = "kiss_icp"  # given: the poses that the source brings
+    # rgbd: by colour and depth; kiss_icp: by shape alone, also in the dark; given: the poses that the source brings
+    method: Literal["rgbd", "kiss_icp", "given"] = "rgbd"
+    rgbd: RgbdConfig = RgbdConfig()
     stride: int = Field(4, ge=1)  # every 4th pixel each way: 19 k points of 640x480
+    mount_roll_deg: Literal[0, 90, 180, 270] = 0  # by how much the camera is turned about its axis, clockwise
     gravity_frames: int = Field(10, ge=1)  # frames that decide which way is up, when the source does not know
 
 
@@ -37,8 +44,9 @@ class PoseNode(Node):
 
     def __init__(self, config: PoseConfig, context: Context) -> None:
         super().__init__(config, context)
-        self._odometry = Odometry(config, context.threads)
-        self._waiting: list[tuple[Pose, F64, NDArray[np.float32]]] = []
+        self._shape = Odometry(config, context.threads)
+        self._rgbd = RgbdOdometry(config.rgbd)
+        self._waiting: list[tuple[Pose, F64, F32]] = []
         self._world_from_start: F64 | None = None
 
     def step(self, message: Message) -> Sequence[Message]:
@@ -47,17 +55,24 @@ class PoseNode(Node):
             return self._release()
         assert isinstance(message, Frame)
         depth_m = message.depth * np.float32(message.depth_unit_m)
-        points = backproject(depth_m, message.intrinsics, self.config.stride)
-        ranges = np.linalg.norm(points, axis=1)
-        points = points[(ranges > self.config.min_range_m) & (ranges < self.config.max_range_m)]
-        estimate = (
-            self._given(message) if self.config.method == "given" else self._odometry.register(points, message.stamp_ns)
-        )
-        pose = Pose(frame_id=message.frame_id, stamp_ns=message.stamp_ns, **estimate)
+        pose = Pose(frame_id=message.frame_id, stamp_ns=message.stamp_ns, **self._estimate(message, depth_m))
         if self._world_from_start is not None:
             return [self._in_world(pose)]
-        self._waiting.append((pose, message.up_camera, points))
+        self._waiting.append((pose, message.up_camera, self._scan(message, depth_m)))
         return self._release() if len(self._waiting) >= self.config.gravity_frames else []
+
+    def _scan(self, frame: Frame, depth_m: F32) -> F32:
+        points = backproject(depth_m, frame.intrinsics, self.config.stride)
+        ranges = np.linalg.norm(points, axis=1)
+        return np.asarray(points[(ranges > self.config.min_range_m) & (ranges < self.config.max_range_m)])
+
+    def _estimate(self, frame: Frame, depth_m: F32) -> dict[str, Any]:
+        if self.config.method == "given":
+            return self._given(frame)
+        if self.config.method == "kiss_icp":
+            return self._shape.register(self._scan(frame, depth_m), frame.stamp_ns)
+        gray = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY)
+        return self._rgbd.register(View(gray, depth_m, frame.intrinsics), frame.stamp_ns)
 
     def _given(self, frame: Frame) -> dict[str, Any]:
         known = is_rigid(frame.given_world_from_camera)
@@ -75,7 +90,7 @@ class PoseNode(Node):
         waiting, self._waiting = self._waiting, []
         if self._world_from_start is None and waiting:
             trusted = [(pose.world_from_camera, up, points) for pose, up, points in waiting if pose.trusted]
-            found = gravity.find_up(trusted, self.config.seed)
+            found = gravity.find_up(trusted, self.config.seed, np.deg2rad(self.config.mount_roll_deg))
             logger.info("up is %s in the start frame, from %s", np.round(found.up, 3).tolist(), found.source)
             if not found.reliable:
                 logger.warning("no way to tell which way is up: the map may be tilted")

@@ -29,21 +29,26 @@ class Up:
     reliable: bool
 
 
-def find_up(samples: Sequence[Sample], seed: int) -> Up:
-    """Decide from the first frames; without any evidence the first camera is taken as level, and says so."""
+def find_up(samples: Sequence[Sample], seed: int, mount_roll_rad: float = 0.0) -> Up:
+    """Decide from the first frames; without any evidence the first camera is taken as level, and says so.
+
+    mount_roll_rad: by how much the camera is turned about its optical axis, clockwise as seen from behind it.
+    """
     known = [pose[:3, :3] @ up for pose, up, _ in samples if np.isfinite(up).all()]
     if known:
         mean = np.mean(known, axis=0)
         return Up(mean / np.linalg.norm(mean), "the source", True)
+    # a camera turned clockwise sees the world turned the other way: up moves from the image's top to its left
+    image_up = np.array([-np.sin(mount_roll_rad), -np.cos(mount_roll_rad), 0.0])
     if samples:
-        camera_up = -np.mean([pose[:3, 1] for pose, _, _ in samples], axis=0)
+        camera_up = np.mean([pose[:3, :3] @ image_up for pose, _, _ in samples], axis=0)
         camera_up /= np.linalg.norm(camera_up)
         cloud = np.concatenate([transform(pose, points) for pose, _, points in samples])
         normal, share = level_plane(cloud, camera_up, seed)
         if share >= MIN_SHARE:
             return Up(normal, f"a level plane with {share:.0%} of the points of {len(samples)} frames", True)
         return Up(camera_up, "the camera itself, taken as level", False)
-    return Up(np.array([0.0, -1.0, 0.0]), "nothing: no trusted frame", False)
+    return Up(image_up, "nothing: no trusted frame", False)
 
 
 def level_plane(cloud: F64, near: F64, seed: int) -> tuple[F64, float]:

@@ -13,15 +13,12 @@ from kiss_icp.kiss_icp import KissICP
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial import KDTree
-from scipy.spatial.transform import Rotation
 
+from placegraph.nodes.pose.motion import stretched
 from placegraph.runtime.geometry import transform
 from placegraph.runtime.node import NodeConfig
 
 F64 = NDArray[np.float64]
-
-SAME_SPAN = 0.05  # stamps of an even rate differ by rounding
-LONGEST_STRETCH = 3.0  # nobody keeps a motion up for longer
 
 
 class OdometryConfig(NodeConfig):
@@ -66,7 +63,7 @@ class Odometry:
         scan = kiss.preprocessor.preprocess(points.astype(np.float64), np.zeros(len(points)), kiss.last_delta)
         source, downsampled = kiss.voxelize(scan)
         sigma = kiss.adaptive_threshold.get_threshold()
-        guess = kiss.last_pose @ _stretched(kiss.last_delta, span_ns, self._span_ns)
+        guess = kiss.last_pose @ stretched(kiss.last_delta, span_ns, self._span_ns)
         pose = kiss.registration.align_points_to_map(
             points=source,
             voxel_map=kiss.local_map,
@@ -134,14 +131,3 @@ def _kiss_config(config: OdometryConfig, threads: int) -> KISSConfig:
     kiss.adaptive_threshold.initial_threshold = config.initial_threshold_m
     kiss.adaptive_threshold.min_motion_th = config.min_motion_m
     return kiss
-
-
-def _stretched(delta: F64, span_ns: int, old_span_ns: int) -> F64:
-    """The motion (4, 4) of `old_span_ns` continued for `span_ns`: live, frames are dropped and the spans differ."""
-    if span_ns <= 0 or old_span_ns <= 0 or abs(span_ns / old_span_ns - 1) < SAME_SPAN:
-        return delta
-    ratio = min(span_ns / old_span_ns, LONGEST_STRETCH)
-    stretched = np.eye(4)
-    stretched[:3, :3] = Rotation.from_rotvec(Rotation.from_matrix(delta[:3, :3]).as_rotvec() * ratio).as_matrix()
-    stretched[:3, 3] = delta[:3, 3] * ratio
-    return stretched

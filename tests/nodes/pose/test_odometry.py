@@ -1,23 +1,6 @@
 import numpy as np
-import pytest
 
-from placegraph.nodes.pose.odometry import LONGEST_STRETCH, Odometry, OdometryConfig, _stretched
-from placegraph.runtime.geometry import pose_from_quaternion, rotation_angle_rad
-
-TURN = pose_from_quaternion(np.array([0.1, 0.0, 0.0]), np.array([0.0, 0.0, np.sin(0.05), np.cos(0.05)]))
-
-
-@pytest.mark.parametrize(("span", "old"), [(0, 5), (5, 0), (100, 100), (104, 100), (-3, 5)])
-def test_even_or_unknown_spans_leave_the_motion_as_it_is(span: int, old: int) -> None:
-    assert _stretched(TURN, span, old) is TURN
-
-
-@pytest.mark.parametrize(("span", "ratio"), [(200, 2.0), (50, 0.5), (10_000, LONGEST_STRETCH)])
-def test_motion_goes_on_for_as_long_as_the_frames_are_apart(span: int, ratio: float) -> None:
-    longer = _stretched(TURN, span, 100)
-    assert longer[0, 3] == pytest.approx(0.1 * ratio)
-    assert rotation_angle_rad(longer[:3, :3]) == pytest.approx(0.1 * ratio)
-
+from placegraph.nodes.pose.odometry import Odometry, OdometryConfig
 
 def corner(count: int, seed: int) -> np.ndarray:
     """Points on three walls that meet in a corner: they hold a pose in every direction."""

@@ -1,0 +1,109 @@
+"""Pose graph: keyframes to Corrections; closes loops and moves what odometry has placed wrongly.
+
+Odometry never waits for it: it takes keyframes, and its poses matter to the map alone.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from placegraph.nodes.pose_graph.level import LevelConfig, find_level
+from placegraph.nodes.pose_graph.loops import LoopConfig, Places
+from placegraph.nodes.pose_graph.optimise import Edge, Level, optimise
+from placegraph.runtime.geometry import inverse, nearest_rigid, rotation_angle_rad
+from placegraph.runtime.messages import Correction, Keyframe, Message
+from placegraph.runtime.node import Context, Node, NodeConfig
+
+logger = logging.getLogger(__name__)
+F64 = NDArray[np.float64]
+
+
+class PoseGraphConfig(NodeConfig):
+    """Sigmas of what the graph is made of, and when the map is told."""
+
+    odometry_m: float = Field(0.004, gt=0)  # of a step between keyframes, departs: from the house's walks
+    odometry_rad: float = Field(0.003, gt=0)
+    loop_m: float = Field(0.015, gt=0)  # of a verified loop; its own covariance takes errors as independent
+    loop_rad: float = Field(0.008, gt=0)
+    moved_m: float = Field(0.02, gt=0)  # a keyframe that moved less than this, and
+    moved_rad: float = Field(0.005, gt=0)  # turned less, stays where the map has it
+    loops: LoopConfig = LoopConfig()
+    level: LevelConfig = LevelConfig()
+
+
+class PoseGraphNode(Node):
+    """Gives one Correction for each Keyframe, in order."""
+
+    config_type = PoseGraphConfig
+    takes = (Keyframe,)
+    gives = (Correction,)
+    config: PoseGraphConfig
+
+    def __init__(self, config: PoseGraphConfig, context: Context) -> None:
+        super().__init__(config, context)
+        self._places = Places(config.loops)
+        self._frame_ids: list[int] = []
+        self._odometry: list[F64] = []
+        self._poses = np.zeros((0, 4, 4))  # as optimised
+        self._told = np.zeros((0, 4, 4))  # as the map has them
+        self._walked_m = np.zeros(0)
+        self._edges: list[Edge] = []
+        self._levels: list[Level] = []
+
+    def step(self, message: Message) -> Sequence[Message]:
+        """Add a keyframe, look for loops, and say where it is; after a loop also who moved."""
+        assert isinstance(message, Keyframe)
+        self._places.add(message)
+        self._append(message)
+        new = len(self._poses) - 1
+        surface = self._places.features[new].surface(self.config.loops.features.surface)
+        level = find_level(surface, self._poses[new], self.config.level)
+        if level is not None:
+            self._levels.append(Level(new, level, self.config.level.sigma_rad))
+        found = self._places.loops(self._poses, self._walked_m)
+        c = self.config
+        self._edges += [Edge(l.first, l.second, l.first_from_second, c.loop_m, c.loop_rad, True) for l in found]
+        if found:
+            self._poses = optimise(self._poses, self._edges, self._levels)
+        moved = self._moved() if found else np.zeros(0, np.int64)
+        self._told[moved] = self._poses[moved]
+        self._told[new] = self._poses[new]
+        return [
+            Correction(
+                frame_id=message.frame_id,
+                stamp_ns=message.stamp_ns,
+                world_from_camera=self._poses[new].copy(),
+                moved_frame_ids=np.array(self._frame_ids, np.int64)[moved],
+                moved_world_from_camera=self._poses[moved],
+            )
+        ]
+
+    def _append(self, keyframe: Keyframe) -> None:
+        """The new pose continues odometry from where the graph has the last keyframe."""
+        given, c = keyframe.world_from_camera, self.config
+        pose, walked_m = given, 0.0
+        if self._odometry:
+            last_from_new = inverse(self._odometry[-1]) @ given
+            pose = nearest_rigid(self._poses[-1] @ last_from_new)
+            walked_m = float(self._walked_m[-1] + np.linalg.norm(last_from_new[:3, 3]))
+            last = len(self._poses) - 1
+            self._edges.append(Edge(last, last + 1, last_from_new, c.odometry_m, c.odometry_rad, False))
+        self._frame_ids.append(keyframe.frame_id)
+        self._odometry.append(given)
+        self._poses, self._told = (np.concatenate((poses, pose[None])) for poses in (self._poses, self._told))
+        self._walked_m = np.append(self._walked_m, walked_m)
+
+    def _moved(self) -> NDArray[np.int64]:
+        """Earlier keyframes that are elsewhere than the map has them."""
+        old, new, c = self._told[:-1], self._poses[:-1], self.config
+        shift = np.linalg.norm(new[:, :3, 3] - old[:, :3, 3], axis=1)
+        turn = np.array([rotation_angle_rad(a[:3, :3].T @ b[:3, :3]) for a, b in zip(old, new, strict=True)])
+        return np.flatnonzero((shift > c.moved_m) | (turn > c.moved_rad))
+
+
+NODE = PoseGraphNode

@@ -1,0 +1,112 @@
+"""Which earlier keyframes show the place of a new one, and where they say it was taken from.
+
+Candidates come from the poses (near, looking the same way, by what odometry may have drifted) and, for loops longer
+than that, from the layout of colours. Each is verified by its keypoints and by laying the views' surfaces onto each
+other (runtime/features.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field
+
+from placegraph.runtime.features import FeatureConfig, Features, describe, relate
+from placegraph.runtime.messages import Keyframe
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+
+LAYOUT = (8, 6)  # cells of the colour layout, columns and rows
+
+
+class LoopConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+    """Where to look for loops."""
+
+    skip: int = Field(3, ge=1)  # the last so many keyframes are odometry's own
+    reach_m: float = 1.5  # between positions of two views that can be matched
+    drift_share: float = 0.01  # ... and so much more for every metre walked since
+    turn_rad: float = 0.8  # between viewing directions
+    tries: int = Field(4, ge=1)  # candidates that are verified for each keyframe, by their poses
+    apart: int = 5  # keyframes between two candidates
+    tries_by_look: int = 1  # ... and by the layout of colours, wherever they are
+    least_likeness: float = 0.9  # of layouts: their correlation
+    features: FeatureConfig = FeatureConfig()
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A verified motion (4, 4) from keyframe number `second` to `first`, and how many corners agree."""
+
+    first: int
+    second: int
+    first_from_second: F64
+    inliers: int
+
+
+@dataclass(eq=False)
+class Places:
+    """All keyframes so far, by number, as what is needed to recognise them."""
+
+    config: LoopConfig
+    features: list[Features] = field(default_factory=list)
+    layouts: list[F32] = field(default_factory=list)
+
+    def add(self, keyframe: Keyframe) -> None:
+        """Remember a keyframe."""
+        depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
+        gray = cv2.cvtColor(keyframe.color, cv2.COLOR_RGB2GRAY)
+        self.features.append(describe(gray, depth_m, keyframe.intrinsics, self.config.features))
+        self.layouts.append(_layout(keyframe.color))
+
+    def loops(self, poses: F64, walked_m: F64) -> list[Loop]:
+        """Loops of the newest keyframe with earlier ones.
+
+        poses: (K, 4, 4) world_from_camera of all; walked_m: (K,) path length at each.
+        """
+        new = len(poses) - 1
+        found = []
+        near = self._near(poses, walked_m)
+        for old in [*near, *self._alike(near)]:
+            pose = relate(self.features[old], self.features[new], self.config.features)
+            if pose is not None:
+                found.append(Loop(old, new, pose.reference_from_camera, int(pose.inlier.sum())))
+        return found
+
+    def _near(self, poses: F64, walked_m: F64) -> list[int]:
+        c, new = self.config, len(poses) - 1
+        old = poses[: max(0, new - c.skip + 1)]
+        if not len(old):
+            return []
+        apart_m = np.linalg.norm(old[:, :3, 3] - poses[new, :3, 3], axis=1)
+        angle = np.arccos(np.clip(old[:, :3, 2] @ poses[new, :3, 2], -1, 1))
+        drift_m = c.drift_share * (walked_m[new] - walked_m[: len(old)])
+        cost = np.maximum(apart_m - drift_m, 0) / c.reach_m + angle / c.turn_rad
+        possible = (apart_m < c.reach_m + drift_m) & (angle < c.turn_rad)
+        chosen: list[int] = []
+        for i in np.argsort(cost, kind="stable").tolist():
+            if len(chosen) == c.tries:
+                break
+            if possible[i] and all(abs(i - j) >= c.apart for j in chosen):
+                chosen.append(i)
+        return chosen
+
+    def _alike(self, known: list[int]) -> list[int]:
+        c, new = self.config, len(self.layouts) - 1
+        old = max(0, new - c.skip + 1)
+        if not old or not c.tries_by_look:
+            return []
+        likeness = np.array(self.layouts[:old]) @ self.layouts[new]
+        best = [i for i in np.argsort(-likeness, kind="stable").tolist() if all(abs(i - j) >= c.apart for j in known)]
+        return [i for i in best[: c.tries_by_look] if likeness[i] >= c.least_likeness]
+
+
+def _layout(color: NDArray[np.uint8]) -> F32:
+    """Unit vector of an image's coarse colours, without their mean: brightness changes from view to view."""
+    small = cv2.resize(cv2.cvtColor(color, cv2.COLOR_RGB2LAB), LAYOUT, interpolation=cv2.INTER_AREA).astype(np.float32)
+    centred = (small - small.mean(axis=(0, 1))).ravel()
+    return np.asarray(centred / max(float(np.linalg.norm(centred)), 1e-6), np.float32)
