@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from placegraph.runtime.geometry import inverse
 from placegraph.runtime.registration import (
     Corners,
     Laid,
@@ -22,7 +23,6 @@ from placegraph.runtime.registration import (
     rays,
     register,
 )
-from placegraph.runtime.geometry import inverse
 from placegraph.runtime.surface import Surface, SurfaceConfig, coarse_depth, scan_points
 
 F32 = NDArray[np.float32]

@@ -24,7 +24,9 @@ class SurfaceConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """When a point is laid onto a plane."""
 
     reach_m: float = Field(0.1, gt=0)  # a point further from the surface is something else
-    noise: float = 0.01  # a distance's sigma is this times the depth squared: three times stereo's, as errors go together
+    noise: float = (
+        0.01  # a distance's sigma is this times the depth squared: three times stereo's, as errors go together
+    )
     least_noise_m: float = 0.01
     max_depth_m: float = 6.0
 

@@ -15,7 +15,9 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = ("configs", "models_onnx", "nodes", "runtime", "tools")
 RING_OF_RUNTIME = {
     **dict.fromkeys(("errors", "messages", "topics", "geometry", "scene_graph"), 0),
-    **dict.fromkeys(("codec", "join", "health", "flow", "question", "recording", "node", "surface", "registration", "features"), 1),
+    **dict.fromkeys(
+        ("codec", "join", "health", "flow", "question", "recording", "node", "surface", "registration", "features"), 1
+    ),
     **dict.fromkeys(("config", "bus", "desk", "process", "launch", "inline", "log"), 3),
 }
 RING_OF_FOLDER = {"models_onnx": 1, "nodes": 2, "tools": 4, "configs": 4}

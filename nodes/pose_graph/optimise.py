@@ -66,7 +66,9 @@ def optimise(poses: F64, edges: Sequence[Edge], levels: Sequence[Level], iterati
 Block = tuple[list[tuple[I64, F64]], F64]  # jacobians (E, R, 6) by the pose (E,) they belong to, and residuals (E, R)
 
 
-def _edge_blocks(poses: F64, first: I64, second: I64, measured: F64, scale: F64, robust: NDArray[np.bool_]) -> list[Block]:
+def _edge_blocks(
+    poses: F64, first: I64, second: I64, measured: F64, scale: F64, robust: NDArray[np.bool_]
+) -> list[Block]:
     a, b = poses[first], poses[second]
     turn_a = np.swapaxes(a[:, :3, :3], 1, 2)
     expected_turn = turn_a @ b[:, :3, :3]

@@ -2,6 +2,7 @@ import numpy as np
 
 from placegraph.nodes.pose.odometry import Odometry, OdometryConfig
 
+
 def corner(count: int, seed: int) -> np.ndarray:
     """Points on three walls that meet in a corner: they hold a pose in every direction."""
     random = np.random.default_rng(seed)

@@ -34,7 +34,9 @@ def frame(i: int, depth_m: np.ndarray, given: np.ndarray | None = None, up: np.n
 
 
 def node(**settings: object) -> PoseNode:
-    return PoseNode(PoseConfig(**({"method": "kiss_icp", "stride": 1, "gravity_frames": 1, "voxel_m": 0.05} | settings)), Context())
+    return PoseNode(
+        PoseConfig(**({"method": "kiss_icp", "stride": 1, "gravity_frames": 1, "voxel_m": 0.05} | settings)), Context()
+    )
 
 
 def only(given: object) -> Pose:
