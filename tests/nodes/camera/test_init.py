@@ -8,8 +8,6 @@ import pytest
 from pydantic import ValidationError
 
 from placegraph.nodes.camera import NODE, Camera, CameraConfig, detect, find
-from placegraph.nodes.camera.sevenscenes import SevenScenes
-from placegraph.nodes.camera.tum import Tum
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import End, Frame
 from placegraph.runtime.node import Context
@@ -40,10 +38,12 @@ def test_auto_on_an_empty_folder_says_what_was_looked_for(tmp_path: Path):
         assert text in str(caught.value)
 
 
-def test_auto_finds_each_format_without_importing_a_device(seven: Path, tum: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("name", ["hm3dsem", "replica", "scannet", "seven", "tum"])
+def test_auto_finds_each_format_without_importing_a_device(
+    name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.delitem(sys.modules, "placegraph.nodes.camera.oak", raising=False)
-    assert detect(str(seven)) is SevenScenes
-    assert detect(str(tum)) is Tum
+    assert detect(str(request.getfixturevalue(name))) is find({"seven": "sevenscenes"}.get(name, name))
     assert "placegraph.nodes.camera.oak" not in sys.modules
 
 
