@@ -86,4 +86,4 @@ def standpoints(xyz: F64, config: FloorConfig) -> F64:
     same = (columns[1:] == columns[:-1]).all(axis=1)
     clear = np.append(np.where(same, np.diff(points[:, 2]), np.inf), np.inf)
     clear = np.minimum(clear, np.percentile(points[:, 2], 99.5) - points[:, 2])
-    return points[clear >= config.storey_m] + np.array([0.0, 0.0, EYE_M])
+    return np.asarray(points[clear >= config.storey_m] + np.array([0.0, 0.0, EYE_M]))
