@@ -23,7 +23,8 @@ VOXEL_M = 0.05  # of the map's cloud, METHOD section 2
 COLUMN_M = 0.2  # plan cells in which surfaces lie above each other: wide enough for a thin scan to show a ceiling
 EYE_M = 1.2  # above what is stood on: midway in the heights that a camera may have (FloorConfig)
 LOWEST_PERCENT = 1.0  # of the places to stand; fewer and lower ones are noise
-LARGEST_M = 500.0  # in plan: 10^8 cells; more is no building, or not in metres
+LARGEST_M = 500.0  # more is no building, or not in metres
+MOST_CELLS = 10_000  # a side: label images of 10^8 pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +59,13 @@ def thinned(xyz: F64, voxel_m: float) -> F64:
 def floors_of_scan(xyz: F64, cell_m: float) -> list[FloorRooms]:
     """Floors of a cloud (N, 3), N >= 1, metres, z up, from the lowest, with rooms on grids of `cell_m`.
 
-    Source: nodes/hierarchy/floors.py and rooms.py with their defaults. Raises ConfigError for a cell of no size.
+    Source: nodes/hierarchy/floors.py and rooms.py with their defaults. Raises ConfigError for cells too small.
     """
-    if not cell_m > 0:
-        raise ConfigError(f"--resolution: {cell_m} metres a pixel is not positive")
+    if not (cell_m > 0 and np.isfinite(cell_m)):
+        raise ConfigError(f"--resolution: {cell_m} metres a pixel is not a positive length")
+    size_m = float(np.ptp(xyz, axis=0).max())
+    if size_m > MOST_CELLS * cell_m:
+        raise ConfigError(f"--resolution: {size_m:.1f} m in pixels of {cell_m} m are more than {MOST_CELLS} a side")
     config, floor_config = RoomConfig(cell_m=cell_m), FloorConfig()
     xyz = thinned(xyz, min(VOXEL_M, cell_m))
     eyes, nothing = standpoints(xyz, floor_config), np.zeros((0, 3))

@@ -114,7 +114,14 @@ def test_clouds_of_no_building_are_named(tmp_path: Path, points: np.ndarray, tex
         read_scan(tmp_path / "a.ply")
 
 
-@pytest.mark.parametrize("cell_m", [0.0, -0.05, float("nan")])
-def test_a_cell_of_no_size_is_named(cell_m: float) -> None:
-    with pytest.raises(ConfigError, match=r"--resolution: .* not positive"):
-        floors_of_scan(np.zeros((1, 3)), cell_m)
+@pytest.mark.parametrize("cell_m", [0.0, -0.05, float("nan"), float("inf"), 1e-5])
+def test_a_cell_of_no_use_is_named(cell_m: float) -> None:
+    with pytest.raises(ConfigError, match=r"--resolution: .*(not a positive length|more than 10000 a side)"):
+        floors_of_scan(np.array([[0, 0, 0], [1, 0, 0.0]]), cell_m)
+
+
+@pytest.mark.parametrize("cell_m", [0.02, 0.3, 3.0])
+def test_fine_and_coarse_cells_find_the_same_floors(cell_m: float) -> None:
+    floors = floors_of_scan(np.concatenate(storey(0.0) + storey(2.8)), cell_m)
+    np.testing.assert_allclose(heights(floors), [[0, 2.5], [2.8, 5.3]], atol=0.05)
+    assert all(floor.rooms for floor in floors)
