@@ -46,7 +46,7 @@ class FeatureConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Keypoints of one view: pixels (N, 2), positions (N, 3) in its camera's frame (NaN: no depth), descriptors (N, 32).
+    """Keypoints of one view: pixels (N, 2), positions (N, 3) in its camera's frame or NaN, descriptors (N, 32).
 
     And its depth on the grid of surfaces, in mm: what is kept of a view to recognise it, 70 kB at 640x480.
     """

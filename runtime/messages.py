@@ -164,7 +164,7 @@ class Keyframe(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Correction(Message):
-    """Where the pose graph puts a keyframe; one for each. After a loop was closed also where it now puts earlier ones."""
+    """Where the pose graph puts a keyframe; one for each. After a loop was closed also where earlier ones are now."""
 
     world_from_camera: F64 = array("float64", (4, 4), unit="m", frame="world")
     moved_frame_ids: I64 = array("int64", ("N",), unit="1")  # of earlier keyframes, ascending; N = 0: none moved

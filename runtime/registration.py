@@ -51,7 +51,7 @@ class Corners:
         return Corners(xyz, uv, inverse_depth)
 
     def linear(self, camera_from_reference: F64, intrinsics: F64, c: RegistrationConfig) -> tuple[F64, F64, F64]:
-        """The least squares' matrix (6, 6) and slope (6,) by the camera's motion, and squared residuals (N,) in sigmas."""
+        """Matrix (6, 6) and slope (6,) of the least squares by the camera's motion; squared residuals (N,) in sigmas."""
         fx, fy, cx, cy = intrinsics
         xyz = transform(camera_from_reference, self.xyz)
         ahead, known = xyz[:, 2] > NEAREST_M, self.inverse_depth > 0
@@ -81,7 +81,7 @@ class Corners:
 
 @dataclass(frozen=True, eq=False)
 class Laid:
-    """Points (M, 3) in metres, camera frame, to be laid onto a surface that was seen from (4, 4) reference_from_surface."""
+    """Points (M, 3) in metres, camera frame, to be laid onto a surface; (4, 4) where that was seen from."""
 
     points: F64
     surface: Surface
@@ -90,7 +90,7 @@ class Laid:
 
 @dataclass(frozen=True, eq=False)
 class Registered:
-    """A pose (4, 4), which corners agree with it (N,), what share of the points met, and how loosely the data hold it."""
+    """A pose (4, 4), which corners agree with it (N,), what share of the points met, how loosely the data hold it."""
 
     reference_from_camera: F64
     inlier: Bool

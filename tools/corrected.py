@@ -28,7 +28,7 @@ class CorrectedKeyframes:
         self._poses.update(moved)
 
     def correct(self, poses: Sequence[Pose]) -> list[Pose]:
-        """Odometry's poses, each moved with the last keyframe at or before it; as they are where there is none at all."""
+        """Odometry's poses, each moved with the last keyframe at or before it; as they are where there is none."""
         odometry = {pose.frame_id: pose.world_from_camera for pose in poses}
         known = sorted(frame_id for frame_id in self._poses if frame_id in odometry)
         if not known:

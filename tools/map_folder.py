@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import platform
-import re
 import subprocess
 import time
 from importlib import metadata
@@ -21,8 +20,10 @@ from placegraph.runtime.geometry import quaternion_xyzw
 from placegraph.runtime.messages import Correction, End, Graph, Map, Message, PlaceNames, Pose
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.corrected import CorrectedKeyframes
+from placegraph.tools.ply import points_of, read_vertices, write_points
 
 GRAPH, CLOUD, OBJECTS, TRAJECTORY, RUN = "graph.json", "cloud.ply", "objects.ply", "trajectory.txt", "run.json"
+RGB = ("red", "green", "blue")
 PACKAGES = (
     "placegraph",
     "numpy",
@@ -104,9 +105,10 @@ class Collector:
         folder.mkdir(parents=True, exist_ok=True)
         write_trajectory(folder / TRAJECTORY, self.poses)
         if self.map is not None:
-            _write_ply(folder / CLOUD, self.map.points_world, {"rgb": self.map.point_colors})
+            colors = dict(zip(RGB, self.map.point_colors.T, strict=True))
+            write_points(folder / CLOUD, self.map.points_world, colors)
             ids = np.repeat(self.map.object_ids, np.diff(self.map.object_point_offsets)).astype(np.int32)
-            _write_ply(folder / OBJECTS, self.map.object_points_world, {"object": ids})
+            write_points(folder / OBJECTS, self.map.object_points_world, {"object": ids})
         if self.graph is not None:
             SceneGraph.from_json(self.graph.json).save(folder / GRAPH)
 
@@ -207,39 +209,24 @@ def read_trajectory(path: Path) -> dict[int, NDArray[np.float64]]:
 def read_cloud(folder: Path) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """Points (P, 3) in metres, world frame, and colours (P, 3) of a map folder; raises SchemaError."""
     path = folder / CLOUD
-    try:
-        head, _, body = path.read_bytes().partition(b"end_header\n")
-    except OSError as error:
-        raise SchemaError(f"{path}: cannot read: {error.strerror}") from None
-    dtype = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
-    count = re.search(rb"element vertex (\d+)\n", head)
-    if count is None or len(body) != int(count[1]) * dtype.itemsize:
-        raise SchemaError(f"{path}: not a cloud that `placegraph run` wrote, or cut short")
-    rows = np.frombuffer(body, dtype)
-    return rows["xyz"].astype(np.float32), rows["rgb"].astype(np.uint8)
+    rows = read_vertices(path)
+    if not set(RGB) <= set(rows.dtype.names or ()):
+        raise SchemaError(f"{path}: not a cloud that `placegraph run` wrote: its points have no colours")
+    rgb = np.stack([rows[channel] for channel in RGB], axis=1)
+    return points_of(rows, path).astype(np.float32), rgb.astype(np.uint8)
 
 
-def _write_ply(path: Path, xyz: NDArray[np.float32], extra: dict[str, NDArray[Any]]) -> None:
-    """Binary PLY of points with either colours (N, 3) uint8 as `rgb` or object ids (N,) int32 as `object`."""
-    fields: list[tuple[str, str]] = [("x", "<f4"), ("y", "<f4"), ("z", "<f4")]
-    names = ["float x", "float y", "float z"]
-    if "rgb" in extra:
-        fields += [("red", "u1"), ("green", "u1"), ("blue", "u1")]
-        names += ["uchar red", "uchar green", "uchar blue"]
-    else:
-        fields.append(("object", "<i4"))
-        names.append("int object")
-    rows = np.zeros(len(xyz), np.dtype(fields))
-    for i, axis in enumerate("xyz"):
-        rows[axis] = xyz[:, i]
-    if "rgb" in extra:
-        for i, channel in enumerate(("red", "green", "blue")):
-            rows[channel] = extra["rgb"][:, i]
-    else:
-        rows["object"] = extra["object"]
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
-    header += [f"property {name}" for name in names] + ["end_header", ""]
-    path.write_bytes("\n".join(header).encode() + rows.tobytes())
+def read_object_clouds(folder: Path) -> dict[str, NDArray[np.float32]]:
+    """Points (N, 3) in metres, world frame, of each object of a map folder by its id; raises SchemaError."""
+    path = folder / OBJECTS
+    rows = read_vertices(path)
+    if "object" not in (rows.dtype.names or ()):
+        raise SchemaError(f"{path}: not the objects' points that `placegraph run` writes: they name no object")
+    xyz = points_of(rows, path).astype(np.float32)
+    order = np.argsort(rows["object"], kind="stable")
+    numbers, starts = np.unique(rows["object"][order], return_index=True)
+    parts = np.split(xyz[order], starts[1:])
+    return {f"O{number}": part for number, part in zip(numbers.tolist(), parts, strict=True)} if len(rows) else {}
 
 
 def _version(package: str) -> str:

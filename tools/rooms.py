@@ -1,4 +1,4 @@
-"""Rooms of an occupancy map that another system made: a picture, or the YAML beside it as ROS's map_server writes."""
+"""Rooms of what another system mapped: an occupancy map (a picture, or ROS's YAML beside it), or a point cloud."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 
 from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, areas_of, segment_rooms, walls_of_plan
 from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.tools.scan import FloorRooms, floors_of_scan, read_scan
 
 Bools = NDArray[np.bool_]
 
@@ -44,21 +45,29 @@ class OccupancyMap:
 
 
 def rooms(
-    image: Annotated[Path, typer.Argument(metavar="IMAGE|YAML", help="Occupancy map; light is free, dark a wall.")],
-    out: Annotated[Path, typer.Option(help="PNG to write: 16 bit, 0 no room, 1 the largest room, and so on.")],
-    resolution: Annotated[float | None, typer.Option(help="Metres a pixel; a YAML brings its own.")] = None,
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="IMAGE|YAML|PLY", help="Occupancy map, light is free, dark a wall; or a point cloud."),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="PNG to write: 16 bit, 0 no room, 1 the largest room, and so on. "
+            "Of a cloud with several floors OUT-1.png for the lowest, OUT-2.png, and so on."
+        ),
+    ],
+    resolution: Annotated[
+        float | None, typer.Option(help="Metres a pixel. A YAML brings its own; of a cloud 0.05 if not given.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON with the outlines in metres.")] = False,
 ) -> None:
-    """Split an occupancy map (PNG, PGM, or ROS's YAML) into rooms and write them as a label image."""
-    plan = read_map(image, resolution)
-    grid, found = rooms_of_plan(plan)
-    if len(found) > MOST_ROOMS:
-        raise SourceError(f"{image}: {len(found)} rooms do not fit a 16 bit image")
-    labels = np.zeros(grid.shape, np.uint16)
-    for number, room in enumerate(found, 1):
-        labels[room.mask] = number
-    if not cv2.imwrite(str(out), labels[::-1]):
-        raise ConfigError(f"--out {out}: cannot write a picture there; is it a .png in a folder that exists?")
+    """Split an occupancy map (PNG, PGM, ROS's YAML), or a point cloud's floors (PLY), into rooms as label images."""
+    if source.suffix.lower() == ".ply":
+        floors = [_floor_row(*one) for one in _write_floors(source, out, resolution)]
+        print(json.dumps({"floors": floors}, sort_keys=True) if as_json else "\n".join(map(_floor_text, floors)))
+        return
+    grid, found = rooms_of_plan(read_map(source, resolution))
+    _write_labels(out, source, grid, found)
     rows = [_row(number, room, grid.cell_m) for number, room in enumerate(found, 1)]
     print(json.dumps({"rooms": rows}, sort_keys=True) if as_json else _text(rows, out))
 
@@ -108,6 +117,45 @@ def _read_yaml(path: Path) -> MapFile:
     except ValidationError as error:
         first = error.errors()[0]
         raise SourceError(f"{path}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}") from None
+
+
+def _write_floors(source: Path, out: Path, resolution: float | None) -> list[tuple[int, FloorRooms, Path]]:
+    """Label images of a cloud's floors: (number from the lowest, floor, file)."""
+    floors = floors_of_scan(read_scan(source), RoomConfig().cell_m if resolution is None else resolution)
+    written = []
+    for number, floor in enumerate(floors, 1):
+        file = out if len(floors) == 1 else out.with_name(f"{out.stem}-{number}{out.suffix}")
+        _write_labels(file, source, floor.grid, floor.rooms)
+        written.append((number, floor, file))
+    return written
+
+
+def _write_labels(out: Path, source: Path, grid: Grid, found: list[RoomArea]) -> None:
+    if len(found) > MOST_ROOMS:
+        raise SourceError(f"{source}: {len(found)} rooms do not fit a 16 bit image")
+    labels = np.zeros(grid.shape, np.uint16)
+    for number, room in enumerate(found, 1):
+        labels[room.mask] = number
+    if out.suffix.lower() != ".png" or not cv2.imwrite(str(out), labels[::-1]):
+        raise ConfigError(f"--out {out}: cannot write a picture there; is it a .png in a folder that exists?")
+
+
+def _floor_row(number: int, floor: FloorRooms, file: Path) -> dict[str, Any]:
+    grid = floor.grid
+    return {
+        "floor": number,
+        "low_m": round(floor.span.low, 3),
+        "high_m": round(floor.span.high, 3),
+        "labels": str(file),
+        "origin_m": np.round(grid.origin, 3).tolist(),  # of the image's lower left corner
+        "cell_m": grid.cell_m,
+        "rooms": [_row(k, room, grid.cell_m) for k, room in enumerate(floor.rooms, 1)],
+    }
+
+
+def _floor_text(row: dict[str, Any]) -> str:
+    heights = f"floor {row['floor']} from {row['low_m']:.2f} to {row['high_m']:.2f} m"
+    return f"{heights}\n{_text(row['rooms'], Path(row['labels']))}"
 
 
 def _row(number: int, room: RoomArea, cell_m: float) -> dict[str, Any]:

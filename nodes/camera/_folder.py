@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.geometry import is_rigid
 
 F64 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
@@ -55,6 +57,59 @@ def read_numbers(path: Path, shape: tuple[int, ...], what: str) -> F64:
         return values.reshape(shape)
     except ValueError:
         raise SourceError(f"{path}: expected {what} ({'x'.join(map(str, shape))} numbers)") from None
+
+
+def read_pose(path: Path) -> F64:
+    """world_from_camera (4, 4) in metres of a text file with 16 numbers, row by row; raises SourceError.
+
+    All NaN where tracking was lost: trackers write -inf or nan (7-Scenes, ScanNet), ScanNet's reader also knows zeros.
+    """
+    matrix = read_numbers(path, (4, 4), "a pose matrix")
+    if not np.isfinite(matrix[:3]).any() or not matrix[:3].any():
+        return NO_POSE.copy()
+    if not is_rigid(matrix):
+        raise SourceError(f"{path}: not a rigid pose: rotation and translation expected")
+    return matrix
+
+
+def read_pinhole(path: Path, size: int = 3) -> F64:
+    """Read fx fy cx cy (4,) in px out of a file with a camera matrix of (size, size); raises SourceError."""
+    matrix = read_numbers(path, (size, size), "a camera matrix")
+    focal_and_centre = matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    plain = np.eye(size)
+    plain[[0, 1, 0, 1], [0, 1, 2, 2]] = focal_and_centre
+    if not np.allclose(matrix, plain, equal_nan=True):
+        raise SourceError(f"{path}: not a pinhole camera matrix without skew: {matrix.tolist()}")
+    return check_intrinsics(focal_and_centre, str(path))
+
+
+def numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, Path]:
+    """The files whose whole name fits `pattern`, by the frame number that its first group holds, in ascending order.
+
+    Raises SourceError without such a folder and where two files have one number.
+    """
+    try:
+        names = sorted(path.name for path in folder.iterdir())
+    except OSError as error:
+        raise SourceError(f"{folder}: cannot be read: {_reason(error)}") from None
+    found: dict[int, Path] = {}
+    for match in filter(None, map(pattern.fullmatch, names)):
+        number, path = int(match[1]), folder / match[0]
+        if number in found:
+            raise SourceError(f"{path}: frame {number} has a second file, {found[number].name}")
+        found[number] = path
+    return dict(sorted(found.items()))
+
+
+def check_same_frames(kinds: dict[str, dict[int, Path]]) -> None:
+    """Raise SourceError where not every kind of file ("colour", "depth", ...) has the frames of the first."""
+    (name, files), *others = kinds.items()
+    for other_name, other in others:
+        lone = sorted(files.keys() ^ other.keys())
+        if lone:
+            path, lacks = (files[lone[0]], other_name) if lone[0] in files else (other[lone[0]], name)
+            counts = f"{len(files)} {name} and {len(other)} {other_name} files"
+            raise SourceError(f"{path}: frame {lone[0]} has no {lacks} file ({counts})")
 
 
 def read_color(path: Path) -> U8:

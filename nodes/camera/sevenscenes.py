@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -18,17 +17,17 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.camera._folder import (
-    NO_POSE,
     NO_UP,
     SourceSettings,
     check_centre,
     check_intrinsics,
-    read_numbers,
+    numbered,
     read_pair,
+    read_pinhole,
+    read_pose,
     read_settings,
 )
 from placegraph.runtime.errors import SourceError
-from placegraph.runtime.geometry import is_rigid
 from placegraph.runtime.messages import Frame
 
 F64 = NDArray[np.float64]
@@ -56,27 +55,27 @@ class SevenScenes:
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self._settings = read_settings(Settings, settings)
         self._folder = _sequence(path)
-        self._colors = _colors(self._folder)
+        self._colors = numbered(self._folder, FRAME)
         if not self._colors:
             raise SourceError(f"{self._folder}: no frame-*.color.jpg or .png")
         file = self._folder / "camera-intrinsics.txt"
         if not file.exists() and (path / file.name).exists():  # one calibration above the sequences
             file = path / file.name
         self._intrinsics_from = str(file) if file.exists() else "[nodes.camera.settings] intrinsics"
-        self._intrinsics = _intrinsics(file) if file.exists() else np.array(self._settings.intrinsics)
-        check_intrinsics(self._intrinsics, self._intrinsics_from)
+        by_setting = np.array(self._settings.intrinsics)
+        self._intrinsics = read_pinhole(file) if file.exists() else check_intrinsics(by_setting, self._intrinsics_from)
 
     @staticmethod
     def matches(path: Path) -> bool:
         """Whether the folder, or its only sequence, holds frame-*.color files."""
         try:
-            return bool(_colors(_sequence(path)))
+            return bool(numbered(_sequence(path), FRAME))
         except (SourceError, OSError):
             return False
 
     def frames(self) -> Iterator[Frame]:
         """Frames by number. Raises SourceError naming the file that is missing or damaged."""
-        for frame_id, (number, color_path) in enumerate(self._colors):
+        for frame_id, (number, color_path) in enumerate(self._colors.items()):
             color, depth = read_pair(color_path, self._beside(color_path, "depth.png"))
             check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
             depth[depth == NO_READING] = 0
@@ -87,13 +86,15 @@ class SevenScenes:
                 depth=depth,
                 depth_unit_m=0.001,  # 7-Scenes: millimetres
                 intrinsics=self._intrinsics,
-                given_world_from_camera=_pose(self._beside(color_path, "pose.txt")),
+                given_world_from_camera=read_pose(self._beside(color_path, "pose.txt")),
                 up_camera=NO_UP,
             )
 
     def given_poses(self) -> dict[int, F64]:
         """stamp_ns to (4, 4) world_from_camera in metres, for every frame that was tracked. Raises SourceError."""
-        poses = {self._stamp_ns(number): _pose(self._beside(path, "pose.txt")) for number, path in self._colors}
+        poses = {
+            self._stamp_ns(number): read_pose(self._beside(path, "pose.txt")) for number, path in self._colors.items()
+        }
         return {stamp: pose for stamp, pose in poses.items() if np.isfinite(pose).all()}
 
     def _stamp_ns(self, number: int) -> int:
@@ -109,40 +110,12 @@ def _sequence(path: Path) -> Path:
     if not path.is_dir():
         raise SourceError(f"{path}: no such folder")
     sequences = sorted(folder for folder in path.glob("seq-*") if folder.is_dir())
-    if not sequences or _colors(path):
+    if not sequences or numbered(path, FRAME):
         return path
     if len(sequences) > 1:
         names = ", ".join(folder.name for folder in sequences)
         raise SourceError(f"{path}: holds several sequences ({names}): give the path of one")
     return sequences[0]
-
-
-def _colors(folder: Path) -> list[tuple[int, Path]]:
-    """(frame number, colour file), by number."""
-    found = [(match, path) for path in folder.iterdir() if (match := FRAME.fullmatch(path.name))]
-    numbered = sorted((int(match[1]), path) for match, path in found)
-    for (number, path), (following, twin) in pairwise(numbered):
-        if number == following:
-            raise SourceError(f"{twin}: frame {number} has a second colour image, {path.name}")
-    return numbered
-
-
-def _intrinsics(file: Path) -> F64:
-    """The four of fx fy cx cy, (4,) px, from a file with the (3, 3) camera matrix."""
-    matrix = read_numbers(file, (3, 3), "a camera matrix")
-    if not np.allclose(matrix[[0, 1, 2, 2, 2], [1, 0, 0, 1, 2]], (0, 0, 0, 0, 1)):
-        raise SourceError(f"{file}: not a pinhole camera matrix without skew: {matrix.tolist()}")
-    return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]])
-
-
-def _pose(file: Path) -> F64:
-    """world_from_camera (4, 4) in metres; NaN where the data set's tracker was lost (it writes -inf or nan)."""
-    matrix = read_numbers(file, (4, 4), "a pose matrix")
-    if not np.isfinite(matrix[:3]).any():
-        return NO_POSE
-    if not is_rigid(matrix):
-        raise SourceError(f"{file}: not a rigid pose: rotation and translation expected")
-    return matrix
 
 
 SOURCE = SevenScenes

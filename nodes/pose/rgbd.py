@@ -25,7 +25,7 @@ NOTHING = {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}  # m
 
 
 class RgbdConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """When a pose is trusted. Departs (all values): in the house's walks at 10, 5 and 3.3 Hz every wrong pose is told."""
+    """When a pose is trusted. Departs: values at which every wrong pose of the house's walks at 10 and 3.3 Hz was told."""
 
     least_inliers: int = Field(20, ge=6)  # corners and patches that agree
     least_share: float = Field(0.15, gt=0)  # of those tracked

@@ -118,7 +118,7 @@ class Tracker:
         )
 
     def accept(self, view: View, start_from_camera: F64, track: Track | None = None) -> bool:
-        """Take in a view at its pose; without its `track` the old landmarks are forgotten. Whether it is the reference."""
+        """Take in a view at its pose; without `track` the old landmarks are forgotten. Whether it is the new reference."""
         self._uv, kept = (track.uv, track.landmarks) if track else (self._uv[:0], np.zeros(0, np.int64))
         self._xyz, self._information = self._xyz[kept], self._information[kept]
         self._update(view, start_from_camera)
@@ -192,7 +192,7 @@ class Tracker:
 
 
 def _tracked(before: U8, now: U8, uv: F32, start: F32, window_px: int, c: TrackConfig) -> tuple[F32, Bool]:
-    """Where points (N, 2) of one image are in the next, sought from `start`; and which come out again on the way back."""
+    """Where points (N, 2) of one image are in the next, sought from `start`; and which of them come back out."""
     settings = {"winSize": (window_px, window_px), "maxLevel": c.levels, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
     found, is_found, _ = cv2.calcOpticalFlowPyrLK(before, now, uv, start.copy(), **settings)
     back, is_back, _ = cv2.calcOpticalFlowPyrLK(now, before, found, uv.copy(), **settings)

@@ -67,7 +67,7 @@ class PoseGraphNode(Node):
             self._levels.append(Level(new, level, self.config.level.sigma_rad))
         found = self._places.loops(self._poses, self._walked_m)
         c = self.config
-        self._edges += [Edge(l.first, l.second, l.first_from_second, c.loop_m, c.loop_rad, True) for l in found]
+        self._edges += [Edge(one.first, one.second, one.first_from_second, c.loop_m, c.loop_rad, True) for one in found]
         if found:
             self._poses = optimise(self._poses, self._edges, self._levels)
         moved = self._moved() if found else np.zeros(0, np.int64)

@@ -11,12 +11,15 @@ from placegraph.tools.map_folder import (
     find_graph,
     next_folder,
     prepare,
+    read_cloud,
     read_config,
+    read_object_clouds,
     read_run,
     read_trajectory,
     write_run,
     write_trajectory,
 )
+from placegraph.tools.ply import write_points
 
 START = {"camera": {"source": "flat"}, "pose": {"method": "given"}, "keyframe": {}}
 MAPPING = START | {"instances": {"model": "drawn_scene"}, "fusion": {}, "hierarchy": {}}
@@ -153,3 +156,14 @@ def test_without_a_map_only_the_trajectory_is_written(tmp_path) -> None:
     collector.add(pose(0))
     collector.write(tmp_path / "map")
     assert [path.name for path in (tmp_path / "map").iterdir()] == ["trajectory.txt"]
+
+
+def test_points_without_what_a_map_needs_are_named(tmp_path) -> None:
+    write_points(tmp_path / "cloud.ply", np.zeros((1, 3)), {"object": np.zeros(1, np.int32)})
+    with pytest.raises(SchemaError, match=r"cloud\.ply: not a cloud that .* no colours"):
+        read_cloud(tmp_path)
+    (tmp_path / "cloud.ply").rename(tmp_path / "objects.ply")
+    assert {name: len(points) for name, points in read_object_clouds(tmp_path).items()} == {"O0": 1}
+    write_points(tmp_path / "objects.ply", np.zeros((1, 3)), {})
+    with pytest.raises(SchemaError, match=r"objects\.ply: not the objects' points"):
+        read_object_clouds(tmp_path)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.errors import ConfigError, SchemaError, SourceError
 from placegraph.tools.cli import app
+from placegraph.tools.ply import write_points
 from placegraph.tools.rooms import read_map, rooms_of_plan
 
 FREE, WALL, UNKNOWN = 254, 0, 205
@@ -97,3 +98,51 @@ def test_wrong_input_is_named(plan: Path) -> None:
         read_map(broken)
     done = CliRunner().invoke(app, ["rooms", str(plan), "--resolution", "0.05", "--out", str(folder / "no" / "a.png")])
     assert isinstance(done.exception, ConfigError)
+
+
+def write_cloud(path: Path, storeys: int) -> None:
+    """Rooms of 4 x 3 m on top of each other, 2.5 m high, with .3 m of slab between them."""
+    x, y, z = (np.arange(0, size + 0.01, 0.04) for size in (4.0, 3.0, 2.5))
+    level = np.stack(np.meshgrid(x, y, [0.0, 2.5], indexing="ij"), axis=-1).reshape(-1, 3)
+    ends = np.stack(np.meshgrid([0.0, 4.0], y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    sides = np.stack(np.meshgrid(x, [0.0, 3.0], z, indexing="ij"), axis=-1).reshape(-1, 3)
+    room = np.concatenate((level, ends, sides))
+    write_points(path, np.concatenate([room + np.array([10.0, -2.0, 2.8 * k]) for k in range(storeys)]), {})
+
+
+def test_a_cloud_of_one_floor_is_written_as_one_image(tmp_path: Path) -> None:
+    cloud, out = tmp_path / "scan.ply", tmp_path / "labels.png"
+    write_cloud(cloud, 1)
+    done = CliRunner().invoke(app, ["rooms", str(cloud), "--out", str(out)])
+    assert done.exit_code == 0 and "floor 1 from" in done.stdout and "1 rooms, labels in" in done.stdout
+    assert [path.name for path in tmp_path.glob("*.png")] == ["labels.png"]
+    assert cv2.imread(str(out), cv2.IMREAD_UNCHANGED).max() == 1
+
+
+def test_each_floor_of_a_cloud_has_its_image_and_they_lie_where_the_json_says(tmp_path: Path) -> None:
+    cloud = tmp_path / "scan.PLY"
+    write_cloud(cloud, 3)
+    call = ["rooms", str(cloud), "--out", str(tmp_path / "labels.png"), "--json", "--resolution", "0.1"]
+    floors = json.loads(CliRunner().invoke(app, call).stdout)["floors"]
+    assert [floor["labels"] for floor in floors] == [str(tmp_path / f"labels-{k}.png") for k in (1, 2, 3)]
+    np.testing.assert_allclose([floor["low_m"] for floor in floors], [0, 2.8, 5.6], atol=0.05)
+    np.testing.assert_allclose([floor["high_m"] for floor in floors], [2.5, 5.3, 8.1], atol=0.05)
+    for floor in floors:
+        (room,) = floor["rooms"]
+        outline = np.array(room["outline_m"])
+        np.testing.assert_allclose(outline.min(axis=0), [10, -2], atol=0.25)
+        np.testing.assert_allclose(outline.max(axis=0), [14, 1], atol=0.25)
+        labels = cv2.imread(floor["labels"], cv2.IMREAD_UNCHANGED)
+        rows, columns = np.nonzero(labels[::-1])
+        xy = np.array(floor["origin_m"]) + (np.stack((columns, rows), axis=1) + 0.5) * floor["cell_m"]
+        assert floor["cell_m"] == 0.1 and len(xy) * 0.01 == pytest.approx(room["area_m2"])
+        assert (xy > outline.min(axis=0)).all() and (xy < outline.max(axis=0)).all()
+
+
+def test_clouds_that_cannot_be_read_or_written_are_named(tmp_path: Path) -> None:
+    absent = CliRunner().invoke(app, ["rooms", str(tmp_path / "a.ply"), "--out", str(tmp_path / "a.png")])
+    assert isinstance(absent.exception, SchemaError) and "a.ply" in str(absent.exception)
+    write_cloud(tmp_path / "a.ply", 1)
+    for out in (tmp_path / "no" / "a.png", tmp_path / "a.txt"):
+        done = CliRunner().invoke(app, ["rooms", str(tmp_path / "a.ply"), "--out", str(out)])
+        assert isinstance(done.exception, ConfigError) and str(out) in str(done.exception)

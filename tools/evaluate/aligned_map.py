@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.geometry import bounding_box, transform
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
-from placegraph.tools.map_folder import OBJECTS, find_graph
+from placegraph.tools.map_folder import OBJECTS, find_graph, read_object_clouds
 
 F64 = NDArray[np.float64]
-
-_HEADER = ("element vertex ", ["property float x", "property float y", "property float z", "property int object"])
-_ROW = np.dtype([("xyz", "<f4", 3), ("object", "<i4")])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +50,7 @@ def read_aligned(folder: Path, true_from_map: F64) -> AlignedMap:
     A turned box would be too large, so boxes are made anew from the moved clouds. Raises SchemaError.
     """
     graph = SceneGraph.load(find_graph(folder))
-    clouds = read_object_clouds(folder / OBJECTS)
+    clouds = read_object_clouds(folder)
     floors = graph.layer("floor")
     number = {floor.id: i for i, floor in enumerate(floors)}
     objects = []
@@ -74,20 +71,3 @@ def _place(graph: SceneGraph, number: dict[str, int], node: Node, true_from_map:
     floor = next(step.id for step in graph.path(node.id) if step.layer == "floor")
     outline = node.footprint @ true_from_map[:2, :2].T + true_from_map[:2, 3]
     return MapPlace(node.id, number[floor], np.asarray(outline))
-
-
-def read_object_clouds(file: Path) -> dict[str, NDArray[np.float32]]:
-    """Points (N, 3) in metres, map frame, of each object by its id, from an objects.ply; raises SchemaError."""
-    try:
-        header, _, body = file.read_bytes().partition(b"end_header\n")
-    except OSError as error:
-        raise SchemaError(f"{file}: cannot read: {error.strerror}") from None
-    lines = header.decode("ascii", "replace").splitlines()
-    wrong = lines[:2] != ["ply", "format binary_little_endian 1.0"] or lines[3:] != _HEADER[1]
-    if wrong or not lines[2].startswith(_HEADER[0]) or len(body) % _ROW.itemsize:
-        raise SchemaError(f"{file}: not the objects' points that `placegraph run` writes")
-    rows = np.frombuffer(body, _ROW)
-    order = np.argsort(rows["object"], kind="stable")
-    numbers, starts = np.unique(rows["object"][order], return_index=True)
-    parts = np.split(rows["xyz"][order], starts[1:])
-    return {f"O{number}": part for number, part in zip(numbers.tolist(), parts, strict=True)} if len(rows) else {}

@@ -11,7 +11,7 @@ import typer
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.export import dsg, glb, ros, svg
+from placegraph.tools.export import clouds, dsg, glb, ros, svg
 from placegraph.tools.map_folder import find_graph
 
 
@@ -20,7 +20,8 @@ class Format(StrEnum):
 
     DSG = "dsg"  # JSON that spark_dsg loads
     SVG = "svg"  # floor plans
-    GLB = "glb"  # points and boxes of objects in 3D
+    GLB = "glb"  # the cloud, outlines of rooms and locations, boxes of objects in 3D
+    PLY = "ply"  # a folder: the points of each node
     ROS = "ros"  # a folder: an occupancy map of each floor for map_server
 
 
@@ -28,16 +29,17 @@ WRITERS: dict[Format, Callable[[Path, SceneGraph, Path], list[Path]]] = {
     Format.DSG: dsg.write,
     Format.SVG: svg.write,
     Format.GLB: glb.write,
+    Format.PLY: clouds.write,
     Format.ROS: ros.write,
 }
 
 
 def export(
     map_folder: Annotated[Path, typer.Argument(metavar="MAP", help="A folder that `placegraph run` wrote.")],
-    kind: Annotated[Format, typer.Argument(metavar="dsg|svg|glb|ros")],
-    out: Annotated[Path, typer.Option(help="File to write; for ros a folder.")],
+    kind: Annotated[Format, typer.Argument(metavar="dsg|svg|glb|ply|ros")],
+    out: Annotated[Path, typer.Option(help="File to write; for ply and ros a folder.")],
 ) -> None:
-    """Write a map for others: spark_dsg (Hydra) JSON, SVG floor plans, a GLB scene, ROS occupancy maps."""
+    """Write a map for others: spark_dsg (Hydra) JSON, SVG floor plans, a GLB scene, PLY points, ROS occupancy maps."""
     graph = SceneGraph.load(find_graph(map_folder))
     try:
         for path in WRITERS[kind](map_folder, graph, out):

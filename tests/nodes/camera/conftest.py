@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -65,4 +66,52 @@ def tum(tmp_path: Path) -> Path:
     # x y z w of pose_matrix's rotation
     track = [f"{start + 0.005 + 0.01 * k:.4f} {0.1 * k + 0.05:.4f} 0 1.5 -0.5 0.5 -0.5 0.5" for k in range(-2, 25)]
     (folder / "groundtruth.txt").write_text("# track\n" + "\n".join(track))
+    return folder
+
+
+@pytest.fixture
+def scannet(tmp_path: Path) -> Path:
+    """Frames 0, 5 and 10 (SensReader's frame_skip); colour twice as large as depth; frame 5 lost its pose."""
+    folder = tmp_path / "scene0000_00"
+    wide = np.repeat(np.repeat(color_image(0), 2, axis=0), 2, axis=1)
+    for number in (0, 5, 10):
+        write_image(folder / f"color/{number}.jpg", wide)
+        write_image(folder / f"depth/{number}.png", depth_image(number))
+        pose = np.full((4, 4), -np.inf) if number == 5 else pose_matrix(number)
+        (folder / "pose").mkdir(exist_ok=True)
+        np.savetxt(folder / f"pose/{number}.txt", pose, fmt="%f")
+    (folder / "intrinsic").mkdir()
+    for name, (f, cx, cy) in {"color": (28.0, 16.5, 12.5), "depth": (14.0, 8.0, 6.0)}.items():
+        matrix = np.array([[f, 0, cx, 0], [0, f, cy, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+        np.savetxt(folder / f"intrinsic/intrinsic_{name}.txt", matrix, fmt="%f")
+        np.savetxt(folder / f"intrinsic/extrinsic_{name}.txt", np.eye(4), fmt="%f")
+    return folder
+
+
+@pytest.fixture
+def replica(tmp_path: Path) -> Path:
+    """Three frames of a scene, the camera's file beside the scene."""
+    folder = tmp_path / "Replica" / "room0"
+    for number in range(3):
+        write_image(folder / f"results/frame{number:06d}.jpg", color_image(number))
+        write_image(folder / f"results/depth{number:06d}.png", depth_image(number))
+    np.savetxt(folder / "traj.txt", [pose_matrix(number).ravel() for number in range(3)])
+    camera = {"w": WIDTH, "h": HEIGHT, "fx": 14.0, "fy": 14.0, "cx": 7.5, "cy": 5.5, "scale": 6553.5}
+    (folder.parent / "cam_params.json").write_text(json.dumps({"camera": camera}))
+    return folder
+
+
+@pytest.fixture
+def hm3dsem(tmp_path: Path) -> Path:
+    """Three frames of a walk: 1.5 m above the origin of a world with y up, looking along -z, a step back each frame."""
+    folder = tmp_path / "00824-Dd4bFSTQ8gi"
+    for number in range(3):
+        name = f"Dd4bFSTQ8gi_{number:06d}"
+        write_image(folder / f"rgb/{name}.png", color_image(number))
+        write_image(folder / f"depth/{name}.png", depth_image(number))
+        pose = np.eye(4)
+        pose[:3, 3] = (0, 1.5, 0.2 * number)
+        (folder / "pose").mkdir(exist_ok=True)
+        (folder / f"pose/{name}.txt").write_text("\t".join(str(value) for value in pose.ravel()) + "\n")
+    (folder / "semantic").mkdir()
     return folder

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import cv2
@@ -97,3 +98,21 @@ def test_principal_point_outside_the_image_is_refused(centre: tuple[float, float
 
 def test_principal_point_inside_is_accepted():
     _folder.check_centre(np.array([40.0, 40.0, 24.5, 19.5]), (40, 50), "here")
+
+
+def test_no_pose_is_infinite_nan_or_zero(tmp_path: Path):
+    file = tmp_path / "p.txt"
+    for text in ("-inf " * 16, "nan " * 16, "0 " * 16, "-inf " * 12 + "0 0 0 1"):
+        file.write_text(text)
+        assert np.isnan(_folder.read_pose(file)).all()
+
+
+def test_numbered_files_come_by_number_and_only_whole_names_count(tmp_path: Path):
+    for name in ("10.jpg", "9.jpg", "007.jpg", "8.jpg.part", "a8.jpg"):
+        (tmp_path / name).touch()
+    assert list(_folder.numbered(tmp_path, re.compile(r"(\d+)\.jpg"))) == [7, 9, 10]
+    (tmp_path / "7.jpg").touch()
+    with pytest.raises(SourceError, match=r"7\.jpg: frame 7 has a second file, 007\.jpg"):
+        _folder.numbered(tmp_path, re.compile(r"(\d+)\.jpg"))
+    with pytest.raises(SourceError, match="nowhere: cannot be read: No such file"):
+        _folder.numbered(tmp_path / "nowhere", re.compile(r"(\d+)\.jpg"))

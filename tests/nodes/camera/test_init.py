@@ -1,16 +1,17 @@
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from placegraph.nodes.camera import NODE, Camera, CameraConfig, detect, find
-from placegraph.nodes.camera.sevenscenes import SevenScenes
-from placegraph.nodes.camera.tum import Tum
 from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.geometry import backproject, transform
 from placegraph.runtime.messages import End, Frame
 from placegraph.runtime.node import Context
 
@@ -40,10 +41,12 @@ def test_auto_on_an_empty_folder_says_what_was_looked_for(tmp_path: Path):
         assert text in str(caught.value)
 
 
-def test_auto_finds_each_format_without_importing_a_device(seven: Path, tum: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("name", ["hm3dsem", "replica", "scannet", "seven", "tum"])
+def test_auto_finds_each_format_without_importing_a_device(
+    name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.delitem(sys.modules, "placegraph.nodes.camera.oak", raising=False)
-    assert detect(str(seven)) is SevenScenes
-    assert detect(str(tum)) is Tum
+    assert detect(str(request.getfixturevalue(name))) is find({"seven": "sevenscenes"}.get(name, name))
     assert "placegraph.nodes.camera.oak" not in sys.modules
 
 
@@ -119,3 +122,66 @@ def test_a_source_without_frames_is_an_error_not_an_empty_run():
     node.source.poses = np.zeros((0, 4, 4))
     with pytest.raises(SourceError, match="flat: the source gave no frame"):
         list(node.messages())
+
+
+def write_image(path: Path, image: np.ndarray) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    assert cv2.imwrite(str(path), image[..., ::-1] if image.ndim == 3 else image)
+
+
+def write_scannet(folder: Path, number: int, frame: Frame) -> dict[str, object]:
+    write_image(folder / f"color/{number}.jpg", np.repeat(np.repeat(frame.color, 2, axis=0), 2, axis=1))
+    write_image(folder / f"depth/{number}.png", frame.depth)
+    for name in ("pose", "intrinsic"):
+        (folder / name).mkdir(exist_ok=True)
+    np.savetxt(folder / f"pose/{number}.txt", frame.given_world_from_camera, fmt="%f")
+    fx, fy, cx, cy = frame.intrinsics
+    for name, k in (("depth", (fx, fy, cx, cy)), ("color", (2 * fx, 2 * fy, 2 * cx + 0.5, 2 * cy + 0.5))):
+        matrix = np.array([[k[0], 0, k[2], 0], [0, k[1], k[3], 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+        np.savetxt(folder / f"intrinsic/intrinsic_{name}.txt", matrix, fmt="%f")
+    return {}
+
+
+def write_replica(folder: Path, number: int, frame: Frame) -> dict[str, object]:
+    write_image(folder / f"results/frame{number:06d}.jpg", frame.color)
+    write_image(folder / f"results/depth{number:06d}.png", np.round(frame.depth * 6.5535).astype(np.uint16))
+    with (folder / "traj.txt").open("a") as file:
+        np.savetxt(file, frame.given_world_from_camera.reshape(1, 16))
+    height, width = frame.depth.shape
+    camera = dict(zip(("fx", "fy", "cx", "cy"), frame.intrinsics.tolist(), strict=True))
+    text = json.dumps({"camera": camera | {"w": width, "h": height, "scale": 6553.5}})
+    (folder.parent / "cam_params.json").write_text(text)
+    return {}
+
+
+def write_hm3dsem(folder: Path, number: int, frame: Frame) -> dict[str, object]:
+    for name, image in (("rgb", frame.color), ("depth", frame.depth)):
+        write_image(folder / f"{name}/scene_{number:06d}.png", image)
+    (folder / "pose").mkdir(exist_ok=True)
+    habitat_from_world = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # (x, y, z) to (x, z, -y)
+    pose = habitat_from_world @ frame.given_world_from_camera @ np.diag([1, -1, -1, 1])
+    np.savetxt(folder / f"pose/scene_{number:06d}.txt", pose.reshape(1, 16), delimiter="\t")
+    return {"intrinsics": frame.intrinsics.tolist()}
+
+
+@pytest.mark.parametrize("write", [write_scannet, write_replica, write_hm3dsem])
+def test_one_walk_in_each_format_is_the_same_world(write, tmp_path: Path):
+    walk = list(drawn().source.frames())
+    folder = tmp_path / "data" / "walk"
+    settings: dict[str, object] = {}
+    for frame in walk:
+        assert frame.depth_unit_m == 0.001
+        settings = write(folder, frame.frame_id, frame)
+    found = list(detect(str(folder))(folder, settings).frames())
+    assert len(found) == len(walk)
+    for there, here in zip(found, walk, strict=True):
+        there.check()
+        clouds = [
+            transform(
+                one.given_world_from_camera, backproject(one.depth * np.float32(one.depth_unit_m), one.intrinsics)
+            )
+            for one in (there, here)
+        ]
+        np.testing.assert_allclose(*clouds, atol=1e-3)
+        np.testing.assert_allclose(there.up_camera, here.up_camera, atol=1e-5)
+        assert np.abs(there.color.astype(int) - here.color).mean() < 8  # JPEG of a noisy image; a wrong one: over 30

@@ -10,7 +10,7 @@ from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.geometry import inverse, transform
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
-from placegraph.tools.evaluate.aligned_map import read_aligned, read_object_clouds
+from placegraph.tools.evaluate.aligned_map import read_aligned
 from placegraph.tools.evaluate.objects import LEAST_FRAMES
 from placegraph.tools.evaluate.report import number, plain, table
 from placegraph.tools.evaluate.trajectory import level_alignment
@@ -18,7 +18,8 @@ from placegraph.tools.house.build import build
 from placegraph.tools.house.export import HouseOrder, export
 from placegraph.tools.house.questions import AskedQuestion, to_json
 from placegraph.tools.house.truth import Seen, read_truth, truth_of, write_truth
-from placegraph.tools.map_folder import _write_ply, write_trajectory
+from placegraph.tools.map_folder import read_object_clouds, write_trajectory
+from placegraph.tools.ply import write_points
 
 ORDER = HouseOrder(seed=5, floors=1, limit=4, width=64, height=48)
 MAP_FROM_TRUE = np.eye(4)
@@ -76,7 +77,7 @@ def write_map(source, folder, objects=None):
         clouds.append(points)
         ids.append(np.full(len(points), one.id))
     SceneGraph.of(nodes).save(folder / "graph.json")
-    _write_ply(folder / "objects.ply", np.concatenate(clouds).astype(np.float32), {"object": np.concatenate(ids)})
+    write_points(folder / "objects.ply", np.concatenate(clouds), {"object": np.concatenate(ids).astype(np.int32)})
     poses = [
         Pose(
             frame_id=k, stamp_ns=stamp, world_from_camera=MAP_FROM_TRUE @ pose, trusted=True, quality=1.0,
@@ -122,16 +123,16 @@ def test_damaged_clouds_are_named(perfect) -> None:
     whole = file.read_bytes()
     for damaged in (b"", whole[:-1], whole.replace(b"int object", b"int thing")):
         file.write_bytes(damaged)
-        with pytest.raises(SchemaError, match=r"objects\.ply: not the objects' points"):
-            read_object_clouds(file)
+        with pytest.raises(SchemaError, match=r"objects\.ply: (not a PLY file|cut short|not the objects' points)"):
+            read_object_clouds(perfect)
     file.unlink()
     with pytest.raises(SchemaError, match=r"objects\.ply: cannot read"):
         read_aligned(perfect, np.eye(4))
 
 
 def test_clouds_of_another_run_are_noticed(perfect) -> None:
-    _write_ply(perfect / "objects.ply", np.zeros((0, 3), np.float32), {"object": np.zeros(0, int)})
-    assert read_object_clouds(perfect / "objects.ply") == {}
+    write_points(perfect / "objects.ply", np.zeros((0, 3)), {"object": np.zeros(0, np.int32)})
+    assert read_object_clouds(perfect) == {}
     with pytest.raises(SchemaError, match="no points of O0"):
         read_aligned(perfect, np.eye(4))
 

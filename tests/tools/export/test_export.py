@@ -1,5 +1,6 @@
 """Each format is read back by the package that it is for, or by a plain reader of it. (command)"""
 
+import shutil
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.export import dsg
-from placegraph.tools.map_folder import read_cloud
+from placegraph.tools.map_folder import read_cloud, read_object_clouds
+from placegraph.tools.ply import write_points
 from placegraph.tools.rooms import read_map
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -75,7 +77,7 @@ def test_ros_maps_have_walls_and_free_rooms_in_the_world_frame(cli, mapped, grap
     assert again.code == 2 and "not an empty folder" in again.err
 
 
-def test_a_glb_holds_the_cloud_and_a_named_box_for_each_object(cli, mapped, graph, tmp_path):
+def test_a_glb_holds_the_cloud_named_boxes_of_objects_and_fences_of_places(cli, mapped, graph, tmp_path):
     trimesh = pytest.importorskip("trimesh", reason="extra `export`")
     out = tmp_path / "map.glb"
     assert cli("export", mapped, "glb", "--out", out).code == 0
@@ -83,11 +85,49 @@ def test_a_glb_holds_the_cloud_and_a_named_box_for_each_object(cli, mapped, grap
     xyz, _ = read_cloud(mapped)
     cloud = scene.geometry["cloud"]
     assert len(cloud.vertices) == len(xyz)
-    things = graph.layer("object")
-    assert {f"{thing.id} {thing.name}" for thing in things} == set(scene.geometry) - {"cloud"}
+    shown = [node for node in graph.nodes.values() if node.layer in ("room", "location", "object")]
+    assert {f"{node.id} {node.name}" for node in shown} == set(scene.geometry) - {"cloud"}
+    room = graph.layer("room")[0]
+    name = f"{room.id} {room.name}"
+    placed, _ = scene.graph.get(name)
+    fence = np.asarray(scene.geometry[name].vertices) @ placed[:3, :3].T + placed[:3, 3]
+    wanted = np.array([room.box[0, 0], room.box[0, 2], -room.box[1, 1]])  # x, z, -y: glTF's up is y
+    np.testing.assert_allclose(fence.min(axis=0), wanted, atol=1e-3)
     placed, _ = scene.graph.get("cloud")
     world = np.asarray(cloud.vertices) @ placed[:3, :3].T + placed[:3, 3]
     np.testing.assert_allclose(world[:, 1], xyz[:, 2], atol=1e-4)  # glTF's up is y
+
+
+def test_each_node_has_its_points_as_ply_in_place(cli, mapped, graph, tmp_path):
+    trimesh = pytest.importorskip("trimesh", reason="extra `export`")
+    out = tmp_path / "ply"
+    assert cli("export", mapped, "ply", "--out", out).code == 0
+    clouds = {path.stem: trimesh.load(path) for path in out.iterdir()}
+    nodes = {node.id: node for node in graph.nodes.values() if node.layer != "building"}
+    assert set(clouds) == set(nodes)
+    xyz, _ = read_cloud(mapped)
+    assert sum(len(clouds[floor.id].vertices) for floor in graph.layer("floor")) == len(xyz)
+    points = read_object_clouds(mapped)
+    for node_id, node in nodes.items():
+        found = np.asarray(clouds[node_id].vertices)
+        if node.layer == "object":
+            np.testing.assert_array_equal(found, points[node_id])
+            assert clouds[node_id].colors[0, :3].tolist() == list(node.color)
+        elif node.layer == "location":
+            assert len(found) == sum(len(points[thing.id]) for thing in graph.descendants(node_id, "object"))
+        elif node.layer == "room":
+            assert (found[:, :2] >= node.box[0, :2] - 0.1).all() and (found[:, :2] <= node.box[1, :2] + 0.1).all()
+            assert len(found) > 100
+    again = cli("export", mapped, "ply", "--out", out)
+    assert again.code == 2 and "not an empty folder" in again.err
+
+
+def test_points_of_another_run_are_noticed(cli, mapped, tmp_path):
+    other = tmp_path / "other"
+    shutil.copytree(mapped, other, ignore=shutil.ignore_patterns("*.rrd"))
+    write_points(other / "objects.ply", np.zeros((0, 3)), {"object": np.zeros(0, np.int32)})
+    done = cli("export", other, "ply", "--out", tmp_path / "ply")
+    assert done.code == 1 and "no points of O" in done.err and not (tmp_path / "ply").exists()
 
 
 def test_equal_maps_give_equal_bytes_and_wrong_input_is_named(cli, mapped, tmp_path):
@@ -101,6 +141,6 @@ def test_equal_maps_give_equal_bytes_and_wrong_input_is_named(cli, mapped, tmp_p
     assert blocked.code == 2 and "cannot write there" in blocked.err
     (tmp_path / "bare").mkdir()
     (tmp_path / "bare" / "graph.json").write_text((mapped / "graph.json").read_text())
-    (tmp_path / "bare" / "cloud.ply").write_bytes(b"ply\nelement vertex 3\nend_header\n")
+    (tmp_path / "bare" / "cloud.ply").write_bytes((mapped / "cloud.ply").read_bytes()[:-1])
     cut = cli("export", tmp_path / "bare", "ros", "--out", tmp_path / "c")
     assert cut.code == 1 and "cut short" in cut.err

@@ -1,0 +1,148 @@
+"""Replica scenes as rendered for iMAP and published with NICE-SLAM: exact colour, depth and poses of a walk in a room.
+
+Source: github.com/cvg/nice-slam (scripts/download_replica.sh, src/utils/datasets.py, configs/Replica): in each scene's
+folder `results/frame000000.jpg`, `results/depth000000.png` and `traj.txt`, whose line N is frame N's camera-to-world
+matrix, row by row; beside the scenes `cam_params.json` with size, pinhole and depth steps a metre (1200x680, 6553.5).
+The camera has x right, y down, z forward (NICE-SLAM turns y and z round for itself, issue 10). The world is that of
+Replica's meshes, z up, so a pose also tells which way is up. Frames carry no times: numbers are turned into times.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, ValidationError
+
+from placegraph.nodes.camera._folder import (
+    SourceSettings,
+    check_centre,
+    check_same_frames,
+    numbered,
+    read_pair,
+    read_settings,
+    read_text,
+)
+from placegraph.runtime.errors import SourceError
+from placegraph.runtime.geometry import is_rigid
+from placegraph.runtime.messages import Frame
+
+F64 = NDArray[np.float64]
+
+COLOR, DEPTH = re.compile(r"frame(\d+)\.jpg"), re.compile(r"depth(\d+)\.png")
+CAMERA, TRACK = "cam_params.json", "traj.txt"
+
+
+class Settings(SourceSettings):
+    """Settings of a Replica scene."""
+
+    rate_hz: float = Field(30.0, gt=0)  # frame numbers are turned into times with it; no rate is published
+
+
+class Pinhole(BaseModel, frozen=True, allow_inf_nan=False):
+    """What cam_params.json says of the camera: image size, pinhole in px, depth steps a metre."""
+
+    w: int = Field(gt=0)
+    h: int = Field(gt=0)
+    fx: float = Field(gt=0)
+    fy: float = Field(gt=0)
+    cx: float = Field(gt=0)
+    cy: float = Field(gt=0)
+    scale: float = Field(gt=0)
+
+
+class CameraFile(BaseModel, frozen=True):
+    """cam_params.json."""
+
+    camera: Pinhole
+
+
+class Replica:
+    """Frames of one scene."""
+
+    summary: ClassVar[str] = (
+        "a Replica scene of NICE-SLAM: results/frame000000.jpg, results/depth000000.png, traj.txt; "
+        "cam_params.json in it or beside it"
+    )
+    live: ClassVar[bool] = False
+
+    def __init__(self, path: Path, settings: dict[str, Any]) -> None:
+        self._settings = read_settings(Settings, settings)
+        if not path.is_dir():
+            raise SourceError(f"{path}: no such folder")
+        images = path / "results"
+        self._colors, self._depths = numbered(images, COLOR), numbered(images, DEPTH)
+        if not self._colors:
+            raise SourceError(f"{images}: no frame*.jpg")
+        check_same_frames({"colour": self._colors, "depth": self._depths})
+        self._camera_file = path / CAMERA if (path / CAMERA).exists() else path.absolute().parent / CAMERA
+        self._camera = _read_camera(self._camera_file)
+        self._track = _read_track(path / TRACK)
+        last = max(self._colors)
+        if last >= len(self._track):
+            raise SourceError(f"{path / TRACK}: {len(self._track)} poses, none for {self._colors[last].name}")
+
+    @staticmethod
+    def matches(path: Path) -> bool:
+        """Whether the folder holds traj.txt and a folder `results`."""
+        return (path / TRACK).is_file() and (path / "results").is_dir()
+
+    def frames(self) -> Iterator[Frame]:
+        """Frames by number. Raises SourceError naming the file that is missing or damaged."""
+        camera = self._camera
+        intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
+        check_centre(intrinsics, (camera.h, camera.w), str(self._camera_file))
+        for frame_id, (number, color_path) in enumerate(self._colors.items()):
+            color, depth = read_pair(color_path, self._depths[number])
+            if depth.shape != (camera.h, camera.w):
+                size = f"{depth.shape[1]}x{depth.shape[0]}"
+                raise SourceError(f"{color_path}: is {size}; {self._camera_file} says {camera.w}x{camera.h}")
+            pose = self._track[number]
+            yield Frame(
+                frame_id=frame_id,
+                stamp_ns=self._stamp_ns(number),
+                color=color,
+                depth=depth,
+                depth_unit_m=1.0 / camera.scale,
+                intrinsics=intrinsics,
+                given_world_from_camera=pose.copy(),
+                up_camera=pose[2, :3].copy(),  # transpose of the rotation, times z
+            )
+
+    def given_poses(self) -> dict[int, F64]:
+        """stamp_ns to (4, 4) world_from_camera in metres."""
+        return {self._stamp_ns(number): self._track[number] for number in self._colors}
+
+    def _stamp_ns(self, number: int) -> int:
+        return round(number * 1e9 / self._settings.rate_hz)
+
+
+def _read_camera(file: Path) -> Pinhole:
+    try:
+        return CameraFile.model_validate_json(read_text(file)).camera
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise SourceError(f"{file}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}") from None
+
+
+def _read_track(file: Path) -> list[F64]:
+    """A (4, 4) world_from_camera in metres for each line."""
+    poses = []
+    for number, line in enumerate(read_text(file).splitlines(), 1):
+        try:
+            pose = np.array([float(word) for word in line.split()]).reshape(4, 4)
+        except ValueError:
+            raise SourceError(
+                f"{file}:{number}: expected a pose of 16 numbers, found {len(line.split())} words"
+            ) from None
+        if not is_rigid(pose):
+            raise SourceError(f"{file}:{number}: not a rigid pose: rotation and translation expected")
+        poses.append(pose)
+    return poses
+
+
+SOURCE = Replica

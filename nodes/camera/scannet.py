@@ -1,0 +1,142 @@
+"""ScanNet scenes as the data set's SensReader extracts them: colour, depth in millimetres, a pose for every frame.
+
+Source: Dai et al., "ScanNet", CVPR 2017; github.com/ScanNet/ScanNet, SensReader/python/SensorData.py (names, units,
+poses camera to world). A pose that was lost is all -inf. The world has z up (paper: scans and poses are aligned to "a
+common coordinate frame with the z-axis as the up vector"), so a pose also tells which way is up. Files carry no times:
+frame numbers are turned into times.
+
+Colour (1296x968 in most scenes) is larger than depth (640x480), and each has its own pinhole with one centre and one
+direction: the maintainers say that the two are aligned and no extrinsic is to be applied (issues 2 and 92). A frame has
+depth's size and pinhole; depth stays as it is, and colour is drawn into that pinhole through both camera matrices, as
+SensReader colours its points (sensorData.h, saveToPointCloud). Departs: colour is averaged over a depth pixel, not one
+pixel picked, and where depth sees a few pixels more than colour, colour's edge is repeated instead of black.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from placegraph.nodes.camera._folder import (
+    SourceSettings,
+    check_centre,
+    check_same_frames,
+    numbered,
+    read_color,
+    read_depth,
+    read_pinhole,
+    read_pose,
+    read_settings,
+)
+from placegraph.runtime.errors import SourceError
+from placegraph.runtime.messages import Frame
+
+F64 = NDArray[np.float64]
+U8 = NDArray[np.uint8]
+
+COLOR, DEPTH, POSE = re.compile(r"(\d+)\.jpg"), re.compile(r"(\d+)\.png"), re.compile(r"(\d+)\.txt")
+# Fields of view of colour and depth are within some percent of each other. SensReader's image_size shrinks images but
+# not the camera matrices beside them: those are then off by the ratio of the sizes.
+LARGEST_VIEW_RATIO = 1.25
+
+
+class Settings(SourceSettings):
+    """Settings of a ScanNet scene."""
+
+    rate_hz: float = Field(30.0, gt=0)  # frame numbers are turned into times with it; the sensor's rate
+
+
+class ScanNet:
+    """Frames of one scene."""
+
+    summary: ClassVar[str] = (
+        "a ScanNet scene that SensReader extracted: color/N.jpg, depth/N.png, pose/N.txt, "
+        "intrinsic/intrinsic_color.txt and intrinsic_depth.txt"
+    )
+    live: ClassVar[bool] = False
+
+    def __init__(self, path: Path, settings: dict[str, Any]) -> None:
+        self._settings = read_settings(Settings, settings)
+        if not path.is_dir():
+            raise SourceError(f"{path}: no such folder")
+        self._colors = numbered(path / "color", COLOR)
+        if not self._colors:
+            raise SourceError(f"{path / 'color'}: no N.jpg")
+        self._depths, self._poses = numbered(path / "depth", DEPTH), numbered(path / "pose", POSE)
+        check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
+        self._color_file, self._depth_file = (
+            path / "intrinsic" / f"intrinsic_{kind}.txt" for kind in ("color", "depth")
+        )
+        self._color_intrinsics = read_pinhole(self._color_file, size=4)
+        self._depth_intrinsics = read_pinhole(self._depth_file, size=4)
+
+    @staticmethod
+    def matches(path: Path) -> bool:
+        """Whether the folder holds color, depth and pose folders."""
+        return all((path / name).is_dir() for name in ("color", "depth", "pose"))
+
+    def frames(self) -> Iterator[Frame]:
+        """Frames by number, of depth's size and pinhole. Raises SourceError naming the file that is wrong."""
+        for frame_id, number in enumerate(self._colors):
+            color, depth = read_color(self._colors[number]), read_depth(self._depths[number])
+            self._check_sizes(self._colors[number], color.shape[:2], depth.shape)
+            pose = read_pose(self._poses[number])
+            yield Frame(
+                frame_id=frame_id,
+                stamp_ns=self._stamp_ns(number),
+                color=redraw(color, self._color_intrinsics, self._depth_intrinsics, depth.shape),
+                depth=depth,
+                depth_unit_m=0.001,  # SensReader/python/README.md: depth shift 1000
+                intrinsics=self._depth_intrinsics,
+                given_world_from_camera=pose,
+                up_camera=pose[2, :3].copy(),  # transpose of the rotation, times z
+            )
+
+    def given_poses(self) -> dict[int, F64]:
+        """stamp_ns to (4, 4) world_from_camera in metres, for every frame that was tracked. Raises SourceError."""
+        poses = {self._stamp_ns(number): read_pose(path) for number, path in self._poses.items()}
+        return {stamp: pose for stamp, pose in poses.items() if np.isfinite(pose).all()}
+
+    def _stamp_ns(self, number: int) -> int:
+        return round(number * 1e9 / self._settings.rate_hz)
+
+    def _check_sizes(self, color_path: Path, color_size: tuple[int, ...], depth_size: tuple[int, int]) -> None:
+        height, width = color_size
+        check_centre(self._depth_intrinsics, depth_size, str(self._depth_file))
+        check_centre(self._color_intrinsics, (height, width), str(self._color_file))
+        view = (self._color_intrinsics[0] / width) / (self._depth_intrinsics[0] / depth_size[1])
+        if not 1 / LARGEST_VIEW_RATIO < view < LARGEST_VIEW_RATIO:
+            raise SourceError(
+                f"{color_path}: a {width}x{height} image does not fit {self._color_file.name}: colour would see "
+                f"{1 / view:.2f} times as wide as depth ({depth_size[1]}x{depth_size[0]}); was it resized?"
+            )
+
+
+def redraw(color: U8, from_intrinsics: F64, to_intrinsics: F64, size: tuple[int, int]) -> U8:
+    """The image that a camera in the same place with another pinhole sees.
+
+    color: (H, W, 3) sRGB. Intrinsics: (4,) fx fy cx cy in px, of `color` and of the result. size: height and width of
+    the result. Where the result sees more than `color`, the edge of `color` is repeated. Equal pinholes change nothing.
+    """
+    height, width = size
+    scale = np.array([width / color.shape[1], height / color.shape[0]])
+    if (scale < 1).any():  # average first, or thin things of the larger image come and go
+        color = np.asarray(cv2.resize(color, (width, height), interpolation=cv2.INTER_AREA))
+        centre = (from_intrinsics[2:] + 0.5) * scale - 0.5  # pixel centres are whole numbers
+        from_intrinsics = np.concatenate((from_intrinsics[:2] * scale, centre))
+    zoom = from_intrinsics[:2] / to_intrinsics[:2]
+    shift = from_intrinsics[2:] - zoom * to_intrinsics[2:]
+    source_from_result = np.column_stack((np.diag(zoom), shift))
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    drawn = cv2.warpAffine(color, source_from_result, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(drawn, np.uint8)
+
+
+SOURCE = ScanNet
