@@ -33,12 +33,12 @@ U8 = NDArray[np.uint8]
 class FeatureConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """What it takes for two views to show one place."""
 
-    keypoints: int = Field(600, ge=50)
+    keypoints: int = Field(default=600, ge=50)
     fast_threshold: int = 7  # of grey levels; OpenCV's 20 finds nothing on painted walls
     ratio: float = 0.8  # Lowe
     reprojection_px: float = 3.0  # of RANSAC, in an image 640 wide
     trials: int = 300
-    least_inliers: int = Field(25, ge=6)
+    least_inliers: int = Field(default=25, ge=6)
     least_met: float = 0.25  # share of the one view's points that must lie on the other's surface
     registration: RegistrationConfig = RegistrationConfig()
     surface: SurfaceConfig = SurfaceConfig()
@@ -69,17 +69,17 @@ class Features:
 
 def describe(gray: U8, depth_m: F32, intrinsics: F64, config: FeatureConfig) -> Features:
     """Features of an image (H, W) with its depth (H, W) in metres, 0 = no reading; intrinsics fx fy cx cy px."""
-    orb = cv2.ORB_create(nfeatures=config.keypoints, fastThreshold=config.fast_threshold)
+    orb = cv2.ORB.create(nfeatures=config.keypoints, fastThreshold=config.fast_threshold)
     keypoints, descriptors = orb.detectAndCompute(gray, None)
     coarse_mm = np.clip(np.rint(coarse_depth(depth_m) * 1000), 0, 65535).astype(np.uint16)
     if descriptors is None:
         none = np.zeros((0, 2), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 32), np.uint8)
         return Features(*none, coarse_mm, intrinsics)
-    uv = cv2.KeyPoint_convert(keypoints).reshape(-1, 2).astype(np.float32)
+    uv = np.array([keypoint.pt for keypoint in keypoints], np.float32).reshape(-1, 2)
     inverse_depth = inverse_depth_at(depth_m, uv)
     z = np.where(inverse_depth > 0, 1 / np.where(inverse_depth > 0, inverse_depth, 1.0), np.nan)
     xyz = (rays(uv, intrinsics) * z[:, None]).astype(np.float32)
-    return Features(uv, xyz, descriptors, coarse_mm, intrinsics)
+    return Features(uv, xyz, np.asarray(descriptors, np.uint8), coarse_mm, intrinsics)
 
 
 def relate(reference: Features, view: Features, config: FeatureConfig) -> Registered | None:

@@ -46,12 +46,14 @@ class Corners:
 
     def and_also(self, other: Corners) -> Corners:
         """Both, these first."""
-        pairs = ((self.xyz, other.xyz), (self.uv, other.uv), (self.inverse_depth, other.inverse_depth))
-        xyz, uv, inverse_depth = (np.concatenate(pair) for pair in pairs)
-        return Corners(xyz, uv, inverse_depth)
+        return Corners(
+            np.concatenate((self.xyz, other.xyz)),
+            np.concatenate((self.uv, other.uv)),
+            np.concatenate((self.inverse_depth, other.inverse_depth)),
+        )
 
     def linear(self, camera_from_reference: F64, intrinsics: F64, c: RegistrationConfig) -> tuple[F64, F64, F64]:
-        """Matrix (6, 6) and slope (6,) of the least squares by the camera's motion; squared residuals (N,) in sigmas."""
+        """Matrix (6, 6), slope (6,) of the least squares by the camera's motion; squared residuals (N,) in sigmas."""
         fx, fy, cx, cy = intrinsics
         xyz = transform(camera_from_reference, self.xyz)
         ahead, known = xyz[:, 2] > NEAREST_M, self.inverse_depth > 0
@@ -117,7 +119,7 @@ def register(
             of_planes, slope_of_planes, met = laid.surface.linear(surface_from_camera, laid.points)
             matrix, slope = matrix + of_planes, slope + slope_of_planes
         off = logarithm(camera_from_reference @ inverse(predicted))
-        step = -np.linalg.solve(matrix + prior + 1e-9 * np.eye(6), slope + prior @ off)
+        step = np.asarray(-np.linalg.solve(matrix + prior + 1e-9 * np.eye(6), slope + prior @ off))
         camera_from_reference = exponential(step) @ camera_from_reference
         if np.abs(step).max() < STILL:
             break

@@ -23,7 +23,7 @@ FLAT_SHARE = 0.25  # of the depth that two cells may be apart and still be one s
 class SurfaceConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """When a point is laid onto a plane."""
 
-    reach_m: float = Field(0.1, gt=0)  # a point further from the surface is something else
+    reach_m: float = Field(default=0.1, gt=0)  # a point further from the surface is something else
     noise: float = (
         0.01  # a distance's sigma is this times the depth squared: three times stereo's, as errors go together
     )

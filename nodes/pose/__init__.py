@@ -30,9 +30,9 @@ class PoseConfig(OdometryConfig):
     # rgbd: by colour and depth; kiss_icp: by shape alone, also in the dark; given: the poses that the source brings
     method: Literal["rgbd", "kiss_icp", "given"] = "rgbd"
     rgbd: RgbdConfig = RgbdConfig()
-    stride: int = Field(4, ge=1)  # every 4th pixel each way: 19 k points of 640x480
+    stride: int = Field(default=4, ge=1)  # every 4th pixel each way: 19 k points of 640x480
     mount_roll_deg: Literal[0, 90, 180, 270] = 0  # by how much the camera is turned about its axis, clockwise
-    gravity_frames: int = Field(10, ge=1)  # frames that decide which way is up, when the source does not know
+    gravity_frames: int = Field(default=10, ge=1)  # frames that decide which way is up, when the source does not know
 
 
 class PoseNode(Node):
@@ -71,7 +71,7 @@ class PoseNode(Node):
             return self._given(frame)
         if self.config.method == "kiss_icp":
             return self._shape.register(self._scan(frame, depth_m), frame.stamp_ns)
-        gray = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY)
+        gray = np.asarray(cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY), np.uint8)
         return self._rgbd.register(View(gray, depth_m, frame.intrinsics), frame.stamp_ns)
 
     def _given(self, frame: Frame) -> dict[str, Any]:

@@ -25,13 +25,13 @@ NOTHING = {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}  # m
 
 
 class RgbdConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """When a pose is trusted. Departs: values at which every wrong pose of the house's walks at 10 and 3.3 Hz was told."""
+    """When a pose is trusted. Departs: with these every wrong pose of a house's walk at 10 and 3.3 Hz was told."""
 
-    least_inliers: int = Field(20, ge=6)  # corners and patches that agree
-    least_share: float = Field(0.15, gt=0)  # of those tracked
-    coast_s: float = Field(1.0, ge=0)  # a motion may be kept up so long
-    places: int = Field(60, ge=1)  # views kept to be recognised, the newest
-    tries: int = Field(12, ge=1)  # of them looked at for each frame of a lost track
+    least_inliers: int = Field(default=20, ge=6)  # corners and patches that agree
+    least_share: float = Field(default=0.15, gt=0)  # of those tracked
+    coast_s: float = Field(default=1.0, ge=0)  # a motion may be kept up so long
+    places: int = Field(default=60, ge=1)  # views kept to be recognised, the newest
+    tries: int = Field(default=12, ge=1)  # of them looked at for each frame of a lost track
     track: TrackConfig = TrackConfig()
     features: FeatureConfig = FeatureConfig()
 

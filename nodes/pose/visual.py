@@ -38,7 +38,7 @@ U8 = NDArray[np.uint8]
 class TrackConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """Lengths in pixels are those of an image 640 wide and scale with it."""
 
-    corners: int = Field(400, ge=20)
+    corners: int = Field(default=400, ge=20)
     corner_distance_px: float = 14.0
     corner_quality: float = 0.005  # of the strongest corner
     window_px: int = 21  # Lucas-Kanade
@@ -118,7 +118,7 @@ class Tracker:
         )
 
     def accept(self, view: View, start_from_camera: F64, track: Track | None = None) -> bool:
-        """Take in a view at its pose; without `track` the old landmarks are forgotten. Whether it is the new reference."""
+        """Take in a view at its pose; without `track` the old landmarks are forgotten. Is it the new reference?"""
         self._uv, kept = (track.uv, track.landmarks) if track else (self._uv[:0], np.zeros(0, np.int64))
         self._xyz, self._information = self._xyz[kept], self._information[kept]
         self._update(view, start_from_camera)
@@ -157,9 +157,9 @@ class Tracker:
         if not len(uv):
             return Corners(xyz, uv, z)
         expected = project(xyz, view.intrinsics, guess)
-        start = np.where(np.isfinite(expected), expected, uv).astype(np.float32) / 2
-        found, kept = _tracked(_shades(last.gray), _shades(view.gray), uv / 2, start, side // 2, c)
-        found = found[kept] * 2
+        start = np.where(np.isfinite(expected), expected, uv).astype(np.float32) / np.float32(2)
+        found, kept = _tracked(_shades(last.gray), _shades(view.gray), uv / np.float32(2), start, side // 2, c)
+        found = found[kept] * np.float32(2)
         return Corners(xyz[kept], found, inverse_depth_at(view.depth_m, found))
 
     def _update(self, view: View, start_from_camera: F64) -> None:
@@ -193,13 +193,20 @@ class Tracker:
 
 def _tracked(before: U8, now: U8, uv: F32, start: F32, window_px: int, c: TrackConfig) -> tuple[F32, Bool]:
     """Where points (N, 2) of one image are in the next, sought from `start`; and which of them come back out."""
-    settings = {"winSize": (window_px, window_px), "maxLevel": c.levels, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
-    found, is_found, _ = cv2.calcOpticalFlowPyrLK(before, now, uv, start.copy(), **settings)
-    back, is_back, _ = cv2.calcOpticalFlowPyrLK(now, before, found, uv.copy(), **settings)
+
+    def flow(a: U8, b: U8, from_uv: F32, to_uv: F32) -> tuple[F32, Bool]:
+        uv, found, _ = cv2.calcOpticalFlowPyrLK(
+            a, b, from_uv, to_uv.copy(), winSize=(window_px, window_px), maxLevel=c.levels,
+            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        )  # fmt: skip
+        return np.asarray(uv, np.float32), np.asarray(found).ravel() == 1
+
+    found, is_found = flow(before, now, uv, start)
+    back, is_back = flow(now, before, found, uv)
     height, width = now.shape
     inside = (found >= 0).all(axis=1) & (found[:, 0] <= width - 1) & (found[:, 1] <= height - 1)
     near = np.linalg.norm(back - uv, axis=1) <= c.back_px
-    return found, (is_found.ravel() == 1) & (is_back.ravel() == 1) & inside & near
+    return found, is_found & is_back & inside & near
 
 
 def _shades(gray: U8) -> U8:

@@ -26,12 +26,12 @@ F64 = NDArray[np.float64]
 class PoseGraphConfig(NodeConfig):
     """Sigmas of what the graph is made of, and when the map is told."""
 
-    odometry_m: float = Field(0.004, gt=0)  # of a step between keyframes, departs: from the house's walks
-    odometry_rad: float = Field(0.003, gt=0)
-    loop_m: float = Field(0.015, gt=0)  # of a verified loop; its own covariance takes errors as independent
-    loop_rad: float = Field(0.008, gt=0)
-    moved_m: float = Field(0.02, gt=0)  # a keyframe that moved less than this, and
-    moved_rad: float = Field(0.005, gt=0)  # turned less, stays where the map has it
+    odometry_m: float = Field(default=0.004, gt=0)  # of a step between keyframes, departs: from the house's walks
+    odometry_rad: float = Field(default=0.003, gt=0)
+    loop_m: float = Field(default=0.015, gt=0)  # of a verified loop; its own covariance takes errors as independent
+    loop_rad: float = Field(default=0.008, gt=0)
+    moved_m: float = Field(default=0.02, gt=0)  # a keyframe that moved less than this, and
+    moved_rad: float = Field(default=0.005, gt=0)  # turned less, stays where the map has it
     loops: LoopConfig = LoopConfig()
     level: LevelConfig = LevelConfig()
 

@@ -18,8 +18,8 @@ class LevelConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """When a view shows which way is up."""
 
     near_rad: float = 0.12  # a normal so near the expected up is that of a level surface
-    least_share: float = Field(0.1, gt=0)  # of the known cells must have one
-    sigma_rad: float = Field(0.01, gt=0)  # of the mean of those normals
+    least_share: float = Field(default=0.1, gt=0)  # of the known cells must have one
+    sigma_rad: float = Field(default=0.01, gt=0)  # of the mean of those normals
     rounds: int = 3
 
 

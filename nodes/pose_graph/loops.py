@@ -27,11 +27,11 @@ LAYOUT = (8, 6)  # cells of the colour layout, columns and rows
 class LoopConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """Where to look for loops."""
 
-    skip: int = Field(3, ge=1)  # the last so many keyframes are odometry's own
+    skip: int = Field(default=3, ge=1)  # the last so many keyframes are odometry's own
     reach_m: float = 1.5  # between positions of two views that can be matched
     drift_share: float = 0.01  # ... and so much more for every metre walked since
     turn_rad: float = 0.8  # between viewing directions
-    tries: int = Field(4, ge=1)  # candidates that are verified for each keyframe, by their poses
+    tries: int = Field(default=4, ge=1)  # candidates that are verified for each keyframe, by their poses
     apart: int = 5  # keyframes between two candidates
     tries_by_look: int = 1  # ... and by the layout of colours, wherever they are
     least_likeness: float = 0.9  # of layouts: their correlation
@@ -59,7 +59,7 @@ class Places:
     def add(self, keyframe: Keyframe) -> None:
         """Remember a keyframe."""
         depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
-        gray = cv2.cvtColor(keyframe.color, cv2.COLOR_RGB2GRAY)
+        gray = np.asarray(cv2.cvtColor(keyframe.color, cv2.COLOR_RGB2GRAY), np.uint8)
         self.features.append(describe(gray, depth_m, keyframe.intrinsics, self.config.features))
         self.layouts.append(_layout(keyframe.color))
 
