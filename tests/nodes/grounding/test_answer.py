@@ -8,7 +8,7 @@ from placegraph.runtime.node import Context
 
 KEYS = {
     "status", "question", "question_id", "object_id", "name", "box", "center", "path", "evidence", "candidates", "sure",
-    "viewpoint", "parse", "revision", "llm_calls",
+    "viewpoint", "parse", "revision", "llm_calls", "approach", "route", "travel_m",
 }  # fmt: skip
 
 
