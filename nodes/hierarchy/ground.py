@@ -32,7 +32,8 @@ class TravelConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     robot_radius_m: float = Field(default=0.25, gt=0)  # a small service robot; also what the house's walker has
     robot_height_m: float = Field(default=1.5, gt=0)  # what hangs higher is passed under
     step_m: float = Field(default=0.15, gt=0)  # lower things are noise of the floor, rugs and thresholds
-    solid_points: int = Field(default=2, ge=1)  # voxels of a column that make an obstacle; one alone is noise
+    solid_points: int = Field(default=2, ge=1)  # voxels of a column that make an obstacle
+    flat_cells: int = Field(default=7, ge=1, le=9)  # or, for the thinnest table top, so many of 3 x 3 with any voxel
     floor_band_m: float = Field(default=0.12, gt=0)  # a point so near to the floor's height shows the floor
     close_m: float = Field(default=0.15, ge=0)  # gaps in the seen floor that are closed, half their width
     blind_m: float = Field(default=1.0, ge=0)  # around where the camera stood: what lies right below is never seen
@@ -77,7 +78,7 @@ def find_ground(
     """
     above = points_world[:, 2] - span.low
     solid = (above > config.step_m) & (above < config.robot_height_m)
-    obstacle = _count(points_world[solid], grid) >= config.solid_points
+    obstacle = _obstacles(_count(points_world[solid], grid), config)
     path = _path(steps_world, grid)
     free = _free(free_points_world, free_cell_m, grid, span, config)
     floor = _count(points_world[np.abs(above) <= config.floor_band_m], grid) > 0
@@ -96,6 +97,13 @@ def _count(points: Points, grid: Grid) -> NDArray[np.int64]:
     rows, columns = grid.cells(points)
     flat = np.bincount(rows * grid.shape[1] + columns, minlength=grid.shape[0] * grid.shape[1])
     return flat.reshape(grid.shape)
+
+
+def _obstacles(count: NDArray[np.int64], config: TravelConfig) -> Bool:
+    """Cells that something stands in or hangs over, from the number of voxels in their columns."""
+    around = cv2.boxFilter((count > 0).astype(np.float32), -1, (3, 3), normalize=False)
+    flat = (count > 0) & (around > config.flat_cells - 0.5)
+    return np.asarray((count >= config.solid_points) | flat)
 
 
 def _path(steps: F64, grid: Grid) -> Bool:

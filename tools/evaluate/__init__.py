@@ -38,6 +38,7 @@ def evaluate(
             raise ConfigError(f"{source}: no {TRUTH}/ here; --questions and --per-class need a house with its truth")
         print(json.dumps(found, sort_keys=True) if as_json else _ate(found))
         return
+    from placegraph.tools.evaluate.connections import connection_text
     from placegraph.tools.evaluate.house import house_scores
     from placegraph.tools.evaluate.report import house_text, plain
 
@@ -45,7 +46,8 @@ def evaluate(
     if as_json:
         print(json.dumps(found | plain(scores), sort_keys=True))
     else:
-        print(f"{_ate(found)}\n{house_text(scores, per_class)}")
+        joined = f"\n{connection_text(scores['connections'])}" if "connections" in scores else ""
+        print(f"{_ate(found)}\n{house_text(scores, per_class)}{joined}")
 
 
 def _ate(found: dict[str, float]) -> str:
