@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-
 from placegraph.runtime.scene_graph import SceneGraph
 
 F64 = NDArray[np.float64]
@@ -66,7 +65,9 @@ def find_route(graph: SceneGraph, start: str | F64, goal: str) -> Route | None:
     before: dict[_State, _State] = {}
     best: dict[_State, float] = {}
     queue: list[tuple[float, _State, _State]] = [
-        (length, (end, a.room), ("", a.room)) for end, length in sorted(a.distance_m.items()) if end in graph.connections
+        (length, (end, a.room), ("", a.room))
+        for end, length in sorted(a.distance_m.items())
+        if end in graph.connections
     ]
     heapq.heapify(queue)
     while queue:
@@ -164,5 +165,3 @@ def _distance_to(footprint: F64, xy: F64) -> float:
     rise = np.where(along[:, 1] == 0, 1.0, along[:, 1])
     crossed = above & (xy[0] < a[:, 0] + (xy[1] - a[:, 1]) / rise * along[:, 0])
     return 0.0 if crossed.sum() % 2 else nearest
-
-

@@ -105,9 +105,7 @@ class SceneGraph:
     ways: tuple[Way, ...] = ()
 
     @classmethod
-    def of(
-        cls, nodes: Iterable[Node], connections: Iterable[Connection] = (), ways: Iterable[Way] = ()
-    ) -> SceneGraph:
+    def of(cls, nodes: Iterable[Node], connections: Iterable[Connection] = (), ways: Iterable[Way] = ()) -> SceneGraph:
         """Make and check a graph; raises SchemaError naming what breaks an invariant."""
         listed, joined = list(nodes), list(connections)
         ids = [*(node.id for node in listed), *(connection.id for connection in joined)]
@@ -126,8 +124,11 @@ class SceneGraph:
         return SceneGraph.of(nodes, self.connections.values(), self.ways)
 
     def check(self) -> None:
-        """One building; each parent present and in an allowed layer; boxes ordered and finite; connections and ways
-        between rooms that exist, no way shorter than the straight line. Raises SchemaError."""
+        """Check the invariants. Raises SchemaError naming what breaks one.
+
+        One building; each parent present and in an allowed layer; boxes ordered and finite; connections and ways of
+        rooms that exist, widths above 0, no length below the straight line.
+        """
         buildings = [node.id for node in self.nodes.values() if node.layer == "building"]
         if len(buildings) != 1:
             raise SchemaError(f"scene graph: expected one building, found {len(buildings)}")

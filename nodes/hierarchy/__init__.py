@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from placegraph.models_onnx import LocationDetector
 from placegraph.models_onnx.load import load, wrong_task
 from placegraph.nodes.hierarchy.build import GraphBuilder, LayerConfig
-from placegraph.nodes.hierarchy.ground import TravelConfig
 from placegraph.nodes.hierarchy.floors import FloorConfig
+from placegraph.nodes.hierarchy.ground import TravelConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
 from placegraph.nodes.hierarchy.rooms import RoomConfig
 from placegraph.runtime.errors import SchemaError

@@ -77,19 +77,15 @@ class GraphBuilder:
         home = [_home(xyz, rooms) for xyz in objects]
         for room in rooms:
             nodes += self._fill(room, [i for i, at in enumerate(home) if at is room], objects, world)
-        places = self._connect(world, list(zip(spans, floor_ids, strict=True)), rooms, objects, home)
-        nodes = [replace(node, approach=places.approaches.get(node.id)) for node in _with_frames(nodes)]
+        nodes = _with_frames(nodes)
+        placed = _placed(nodes, {f"O{number}": room.id for number, room in zip(world.object_ids, home, strict=True)})
+        places = self._connect(world, list(zip(spans, floor_ids, strict=True)), rooms, placed)
+        nodes = [replace(node, approach=places.approaches.get(node.id)) for node in nodes]
         return SceneGraph.of(nodes, places.connections, places.ways)
 
     def _connect(
-        self,
-        world: Map,
-        floors: list[tuple[FloorSpan, str]],
-        rooms: list[_Room],
-        objects: list[Points],
-        home: list[_Room],
+        self, world: Map, floors: list[tuple[FloorSpan, str]], rooms: list[_Room], objects: list[PlacedObject]
     ) -> PlaceGraph:
-        """The place graph of the rooms; `home` is the room of each object."""
         points = world.points_world if len(world.points_world) else world.object_points_world
         plans = []
         for span, floor_id in floors:
@@ -97,15 +93,7 @@ class GraphBuilder:
             inside, free = _in_zone(points, span), _in_zone(world.free_points_world, span)
             masks = tuple((room.id, room.area.mask) for room in here)
             plans.append(FloorPlan(floor_id, span, here[0].grid, inside, free, masks))
-        placed = [
-            PlacedObject(
-                f"O{int(world.object_ids[i])}",
-                room.id,
-                Target(convex_footprint(objects[i]), world.object_boxes_world[i].mean(axis=0).astype(float)),
-            )
-            for i, room in enumerate(home)
-        ]
-        return self._places.build(world, plans, placed)
+        return self._places.build(world, plans, objects)
 
     def _find_rooms(
         self, points: Points, free_points: Points, free_cell_m: float, span: FloorSpan, floor_id: str
@@ -126,6 +114,14 @@ class GraphBuilder:
             box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
         return nodes + [_object(i, parent[i], objects[i], world) for i in members]
+
+
+def _placed(nodes: list[Node], room_of: dict[str, str]) -> list[PlacedObject]:
+    return [
+        PlacedObject(node.id, room_of[node.id], Target(node.footprint, node.center))
+        for node in nodes
+        if node.id in room_of
+    ]
 
 
 def _check(world: Map) -> None:

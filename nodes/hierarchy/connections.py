@@ -91,11 +91,13 @@ class _Portal:
 class _Room:
     """What was found for one room, and from what."""
 
+    ids: tuple[str, ...]  # of its connections
     free: Bool
     tops: NDArray[np.uint8]
     reach: Reach
     middle: tuple[int, int] | None
     reached: Bool
+    ways: dict[tuple[str, str], Way] = field(default_factory=dict)
     stands: dict[str, tuple[Target, Stand | None]] = field(default_factory=dict)
 
 
@@ -127,7 +129,7 @@ class PlaceGraphBuilder:
                 mine = [portal for portal in portals if room_id in portal.rooms]
                 room = self._rooms[room_id] = self._room(floor, number, room_id, mine, known.get(room_id))
                 ends = [portal.id for portal in mine] + [room_id] * (room.middle is not None)
-                ways += _ways(room_id, ends, room.reach)
+                ways += _ways(room_id, ends, room)
                 held = [thing for thing in objects if thing.room == room_id]
                 approaches |= self._approaches(floor, room, ends, held)
         return PlaceGraph([_connection(portal) for portal in portals], ways, approaches)
@@ -156,7 +158,9 @@ class PlaceGraphBuilder:
         for number, end in zip(stairs.floors, stairs.ends, strict=True):
             floor = floors[number]
             rows, columns = np.nonzero(floor.ground.standing & (floor.owner >= 0))
-            apart = np.hypot(*(floor.plan.grid.origin + (np.stack((columns, rows), 1) + 0.5) * floor.plan.grid.cell_m - end[:2]).T)
+            apart = np.hypot(
+                *(floor.plan.grid.origin + (np.stack((columns, rows), 1) + 0.5) * floor.plan.grid.cell_m - end[:2]).T
+            )
             if not len(apart) or apart.min() > STAIRS_ROOM_M:
                 return None
             nearest = int(np.argmin(apart))
@@ -179,13 +183,15 @@ class PlaceGraphBuilder:
         tops = np.where(floor.owner == number, floor.ground.tops, 0).astype(np.uint8)
         middle = _middle(free, floor.ground)
         starts = (*cells, *([middle] if middle else []))
-        if known is not None and known.reach.cells == starts and np.array_equal(known.free, free):
+        ids = tuple(portal.id for portal in portals)
+        if known is not None and (known.ids, known.reach.cells) == (ids, starts) and np.array_equal(known.free, free):
             if np.array_equal(known.tops, tops):
                 return known
-            return _Room(free, tops, known.reach, middle, known.reached)
+            return _Room(ids, free, tops, known.reach, middle, known.reached, known.ways)
         reach = reach_from(starts, free, floor.plan.grid)
-        reached = np.isfinite(reach.distance_m[: len(cells) or None]).any(axis=0) if starts else np.zeros_like(free)
-        return _Room(free, tops, reach, middle, reached)
+        # a room without connections: what hangs together with its middle
+        reached = np.asarray(np.isfinite(reach.distance_m[: len(cells) or None]).any(axis=0))
+        return _Room(ids, free, tops, reach, middle, reached)
 
     def _approaches(
         self, floor: _Floor, room: _Room, ends: list[str], objects: Sequence[PlacedObject]
@@ -222,14 +228,15 @@ def _middle(free: Bool, ground: Ground) -> tuple[int, int] | None:
     return int(row), int(column)
 
 
-def _ways(room_id: str, ends: list[str], reach: Reach) -> list[Way]:
-    found = []
+def _ways(room_id: str, ends: list[str], room: _Room) -> list[Way]:
+    reach = room.reach
     for i in range(len(ends)):
         for j in range(i + 1, len(ends)):
-            if np.isfinite(reach.distance_m[i][reach.cells[j]]):
+            pair = (ends[i], ends[j])
+            if pair not in room.ways and np.isfinite(reach.distance_m[i][reach.cells[j]]):
                 points = reach.way(i, reach.cells[j])
-                found.append(Way(room=room_id, ends=(ends[i], ends[j]), length_m=length_of(points), points=points))
-    return found
+                room.ways[pair] = Way(room=room_id, ends=pair, length_m=length_of(points), points=points)
+    return list(room.ways.values())
 
 
 def _connection(portal: _Portal) -> Connection:

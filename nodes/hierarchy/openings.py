@@ -72,7 +72,9 @@ def _meetings(owner: I32) -> dict[tuple[int, int], Bool]:
     for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         a, b = owner[one], owner[other]
         touch = (a != b) & (a != NOBODY) & (b != NOBODY)
-        for low, high in sorted(set(zip(np.minimum(a, b)[touch].tolist(), np.maximum(a, b)[touch].tolist(), strict=True))):
+        for low, high in sorted(
+            set(zip(np.minimum(a, b)[touch].tolist(), np.maximum(a, b)[touch].tolist(), strict=True))
+        ):
             pair = touch & (np.minimum(a, b) == low) & (np.maximum(a, b) == high)
             line = found.setdefault((low, high), np.zeros(owner.shape, bool))
             line[one] |= pair

@@ -51,7 +51,7 @@ def steps_on(number: int, positions_world: Points, standing: I64, config: Travel
     xyz = np.asarray(positions_world, float)
     pairs = np.stack((xyz[:-1], xyz[1:]), axis=1)
     near = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1) <= config.path_gap_m
-    return pairs[near & (standing[:-1] == number) & (standing[1:] == number)]
+    return np.asarray(pairs[near & (standing[:-1] == number) & (standing[1:] == number)])
 
 
 def find_stairs(
@@ -101,6 +101,6 @@ def _add(found: list[Stairs], climb: Stairs, config: TravelConfig) -> None:
 def _width(eye: F64, points: Points, config: TravelConfig) -> float:
     """Twice the distance from a camera (3,) half way up to what stands beside it; the robot's width at least."""
     most = config.stairs_width_max_m
-    beside = points[(np.abs(points[:, 2] - eye[2]) < SLICE_M) & (np.abs(points[:, :2] - eye[:2]).max(axis=1) < most)]
-    nearest = np.linalg.norm(beside[:, :2] - eye[:2], axis=1).min(initial=most)
+    beside = points[np.abs(points[:, 2] - eye[2]) < SLICE_M, :2]
+    nearest = np.linalg.norm(beside - eye[:2], axis=1).min(initial=most)
     return float(np.clip(2 * nearest, 2 * config.robot_radius_m, most))

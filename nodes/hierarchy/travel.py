@@ -83,9 +83,7 @@ def _graph(free: Bool, number: I64) -> csr_array:
     numbers = np.pad(number, 2, constant_values=-1)
     tails, heads, costs = [], [], []
     for (row, column), beside in STEPS.items():
-        able = free & moved(wide, row, column)
-        for cell in beside:
-            able = able & moved(wide, *cell)
+        able = np.logical_and.reduce([moved(wide, *cell) for cell in ((0, 0), (row, column), *beside)])
         tails.append(number[able])
         heads.append(moved(numbers, row, column)[able])
         costs.append(np.full(int(able.sum()), np.hypot(row, column)))

@@ -24,7 +24,9 @@ LEAST_TRAVEL_M = 1.0  # ratios of shorter ways say more about where the door's m
 FAR = 1e6
 
 
-def connection_scores(graph: SceneGraph, true_from_map: F64, truth: Truth, seen_rooms: frozenset[int]) -> dict[str, Any]:
+def connection_scores(
+    graph: SceneGraph, true_from_map: F64, truth: Truth, seen_rooms: frozenset[int]
+) -> dict[str, Any]:
     """Precision and recall of doors (archways and openings included) and of stairs; errors; ratio of travel.
 
     true_from_map: (4, 4). Recall is of true connections between rooms that the walk saw; precision is of all found
@@ -119,8 +121,9 @@ def connection_text(scores: dict[str, Any]) -> str:
         f"{number(one['precision'])}, recall {number(one['recall'])}, width off by {number(one['width_error_m'], 2)} m"
         for name, one in (("doors", doors), ("stairs", stairs))
     ]
+    ratios = f"{number(travel['least_ratio'], 2)} to {number(travel['largest_ratio'], 2)}"
     return (
         f"joined by  {'; '.join(parts)}\n"
-        f"travel     between {travel['pairs']} pairs of them on one floor {number(travel['mean_ratio'])} of the true length on average, "
-        f"{number(travel['least_ratio'], 2)} to {number(travel['largest_ratio'], 2)}"
+        f"travel     {number(travel['mean_ratio'])} of the true length on average between {travel['pairs']} pairs of "
+        f"them on one floor, {ratios}"
     )

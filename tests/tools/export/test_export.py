@@ -23,7 +23,10 @@ def test_spark_dsg_loads_every_node_box_name_and_edge(cli, mapped, graph, tmp_pa
     out = tmp_path / "dsg.json"
     assert cli("export", mapped, "dsg", "--out", out).code == 0
     found = spark_dsg.DynamicSceneGraph.load(str(out))
-    assert found.num_nodes() == len(graph.nodes) and found.num_edges() == len(graph.nodes) - 1
+    joined = {one.rooms for one in graph.connections.values()}
+    assert found.num_nodes() == len(graph.nodes) and found.num_edges() == len(graph.nodes) - 1 + len(joined)
+    for a, b in joined:
+        assert found.has_edge(dsg.symbol(a), dsg.symbol(b))
     for node in graph.nodes.values():
         there = found.get_node(dsg.symbol(node.id))
         assert there.id.str(False) == f"{node.id[0]}({node.id[1:]})" and there.layer.layer == dsg.LAYERS[node.layer]
