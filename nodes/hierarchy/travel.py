@@ -113,7 +113,7 @@ def _straightened(chain: I64, free: Bool) -> I64:
 
 def sees(one: I64, other: I64, free: Bool) -> bool:
     """Whether the straight line between the middles of two cells (row, column) runs over free cells alone."""
-    steps = 2 * int(np.abs(other - one).max()) + 1
+    steps = 4 * int(np.abs(other - one).max()) + 1  # a corner is cut by less than a quarter of a cell
     line = np.rint(one + (other - one) * np.linspace(0, 1, steps)[:, None]).astype(np.int64)
     return bool(free[line[:, 0], line[:, 1]].all())
 

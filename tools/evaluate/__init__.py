@@ -38,7 +38,6 @@ def evaluate(
             raise ConfigError(f"{source}: no {TRUTH}/ here; --questions and --per-class need a house with its truth")
         print(json.dumps(found, sort_keys=True) if as_json else _ate(found))
         return
-    from placegraph.tools.evaluate.connections import connection_text
     from placegraph.tools.evaluate.house import house_scores
     from placegraph.tools.evaluate.report import house_text, plain
 
@@ -46,8 +45,7 @@ def evaluate(
     if as_json:
         print(json.dumps(found | plain(scores), sort_keys=True))
     else:
-        joined = f"\n{connection_text(scores['connections'])}" if "connections" in scores else ""
-        print(f"{_ate(found)}\n{house_text(scores, per_class)}{joined}")
+        print(f"{_ate(found)}\n{house_text(scores, per_class)}")
 
 
 def _ate(found: dict[str, float]) -> str:

@@ -14,7 +14,6 @@ from placegraph.runtime.geometry import transform
 from placegraph.runtime.place_graph import Connection
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.places import share
-from placegraph.tools.evaluate.report import number
 from placegraph.tools.house.truth import TrueConnection, Truth
 
 F64 = NDArray[np.float64]
@@ -111,19 +110,3 @@ def travel_lengths(graph: SceneGraph) -> dict[tuple[str, str], float]:
 
 def _mean(values: list[float]) -> float:
     return share(sum(values), len(values))
-
-
-def connection_text(scores: dict[str, Any]) -> str:
-    """Scores as connection_scores gives them, as two lines."""
-    doors, stairs, travel = scores["doors"], scores["stairs"], scores["travel"]
-    parts = [
-        f"{one['truth']} {name} of {one['of']} between rooms seen, {one['map']} in the map: precision "
-        f"{number(one['precision'])}, recall {number(one['recall'])}, width off by {number(one['width_error_m'], 2)} m"
-        for name, one in (("doors", doors), ("stairs", stairs))
-    ]
-    ratios = f"{number(travel['least_ratio'], 2)} to {number(travel['largest_ratio'], 2)}"
-    return (
-        f"joined by  {'; '.join(parts)}\n"
-        f"travel     {number(travel['mean_ratio'])} of the true length on average between {travel['pairs']} pairs of "
-        f"them on one floor, {ratios}"
-    )

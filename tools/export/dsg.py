@@ -1,7 +1,8 @@
 """Scene graph as the JSON of spark_dsg (MIT-SPARK), which Hydra and its tools read.
 
 Layers: OBJECTS 2, PLACES 3 (our locations), ROOMS 4, FLOORS 5, BUILDINGS 6; a node's symbol is the letter and number
-of its id. Rooms that a door, an opening or stairs join have an edge. Names of objects are a labelspace of their layer. Source: files that spark_dsg 1.1.3 wrote.
+of its id. Rooms that a door, an opening or stairs join have an edge. Names of objects are a labelspace of their layer.
+Source: files that spark_dsg 1.1.3 wrote.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Floor plans as one SVG: a drawing a floor, side by side, in metres; rooms, locations and objects by name, doors, stairs."""
+"""Floor plans as one SVG: a drawing a floor, in metres: rooms, locations, objects, doors and stairs."""
 
 from __future__ import annotations
 
@@ -82,7 +82,8 @@ def _passage(connection: Connection, end: np.ndarray) -> str:
     """A disc of the passage's width; for stairs a line in plan from this floor's end to the other's."""
     title = f"<title>{escape(f'{connection.id} {connection.kind}')}</title>"
     if connection.kind != "stairs":
-        return f'<circle class="door" cx="{end[0]:.3f}" cy="{end[1]:.3f}" r="{connection.width_m / 2:.3f}">{title}</circle>'
+        x, y, radius = end[0], end[1], connection.width_m / 2
+        return f'<circle class="door" cx="{x:.3f}" cy="{y:.3f}" r="{radius:.3f}">{title}</circle>'
     (x0, y0), (x1, y1) = connection.ends[:, :2].tolist()
     return f'<line class="stairs" x1="{x0:.3f}" y1="{y0:.3f}" x2="{x1:.3f}" y2="{y1:.3f}">{title}</line>'
 
