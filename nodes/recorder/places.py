@@ -57,7 +57,11 @@ def draw_connections(picture: Picture, scene: SceneGraph) -> None:
     """Doors and openings as discs of their width, stairs as a line, the ways between them in one thin net."""
     drawn: dict[str, Any] = {}
     for one in scene.connections.values():
-        look = {"colors": [CONNECTION_COLORS[one.kind]], "labels": [f"{one.id} {one.kind}"], "show_labels": True}
+        look: dict[str, Any] = {
+            "colors": [CONNECTION_COLORS[one.kind]],
+            "labels": [f"{one.id} {one.kind}"],
+            "show_labels": True,
+        }
         ends = one.ends + np.array([0, 0, CONNECTION_RAISE_M])
         if one.kind == "stairs":
             drawn[f"world/connections/{one.id}"] = rr.LineStrips3D([ends], radii=[0.03], **look)

@@ -64,8 +64,8 @@ def _shapes(graph: SceneGraph, floor: Node) -> Iterator[str]:
     for thing in graph.descendants(floor.id, "object"):
         yield _polygon("object", thing)
     for connection in graph.connections.values():
-        for room, end in zip(connection.rooms, connection.ends, strict=True):
-            if graph.nodes[room].parent == floor.id:
+        for room_id, end in zip(connection.rooms, connection.ends, strict=True):
+            if graph.nodes[room_id].parent == floor.id:
                 yield _passage(connection, end)
                 if connection.kind != "stairs":  # both ends are the same, on the same floor
                     break
