@@ -1,8 +1,10 @@
 """The five-layer scene graph: a value with invariants and one canonical JSON form.
 
 Building -> floors -> rooms -> locations -> objects. Ids are a letter and a number (B0 F1 R4 L12 O57) and never reused.
-Edges between layers are the parent ids and nothing else; relations inside a layer are computed when asked for.
-Source: paper, section "Method" (G = (N, E), the boolean inter-layer edges).
+Edges between layers are the parent ids and nothing else. Inside a layer, what the building itself fixes is stored: the
+connections between rooms (C3: doors, openings, stairs), the ways of a robot between them, where it can stand before an
+object (place_graph.py). Relations between objects, which depend on who asks, are computed when asked for.
+Source: paper, section "Method" (G = (N, E), the boolean inter-layer edges). Departs: it has no place graph.
 """
 
 from __future__ import annotations
@@ -20,8 +22,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.place_graph import (
+    Approach,
+    Connection,
+    Way,
+    approach_from_dict,
+    approach_to_dict,
+    check_approach,
+    check_connection,
+    check_way,
+    connection_from_dict,
+    connection_key,
+    connection_to_dict,
+    rounded,
+    way_from_dict,
+    way_to_dict,
+)
 
-VERSION = 1
+VERSION = 2  # 2: connections, ways and approaches
 LAYERS = {"B": "building", "F": "floor", "R": "room", "L": "location", "O": "object"}
 PARENT_LAYERS = {
     "building": (),
@@ -55,6 +73,7 @@ class Node:
     observations: int = 0
     oriented_box: tuple[float, ...] = ()  # objects: centre x y z, size x y z, yaw in rad about z
     color: tuple[int, ...] = ()  # objects: sRGB median
+    approach: Approach | None = None  # objects: where to stand to face it; None where there is no such place
 
     @property
     def layer(self) -> str:
@@ -79,28 +98,50 @@ class Node:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SceneGraph:
-    """Nodes by id. Build it with `SceneGraph.of`, which checks the invariants."""
+    """Nodes and connections by id, and ways. Build it with `SceneGraph.of`, which checks the invariants."""
 
     nodes: dict[str, Node] = field(default_factory=dict)
+    connections: dict[str, Connection] = field(default_factory=dict)
+    ways: tuple[Way, ...] = ()
 
     @classmethod
-    def of(cls, nodes: Iterable[Node]) -> SceneGraph:
-        """Make and check a graph; raises SchemaError naming the node that breaks an invariant."""
-        listed = list(nodes)
-        graph = cls(nodes={node.id: node for node in sorted(listed, key=lambda node: id_key(node.id))})
-        if len(graph.nodes) != len(listed):
-            ids = [node.id for node in listed]
+    def of(cls, nodes: Iterable[Node], connections: Iterable[Connection] = (), ways: Iterable[Way] = ()) -> SceneGraph:
+        """Make and check a graph; raises SchemaError naming what breaks an invariant."""
+        listed, joined = list(nodes), list(connections)
+        ids = [*(node.id for node in listed), *(connection.id for connection in joined)]
+        if len(set(ids)) != len(ids):
             raise SchemaError(f"scene graph: id {next(i for i in ids if ids.count(i) > 1)} appears more than once")
+        graph = cls(
+            nodes={node.id: node for node in sorted(listed, key=lambda node: id_key(node.id))},
+            connections={one.id: one for one in sorted(joined, key=lambda one: connection_key(one.id))},
+            ways=tuple(sorted(ways, key=lambda way: (id_key(way.room), way.ends))),
+        )
         graph.check()
         return graph
 
+    def with_nodes(self, nodes: Iterable[Node]) -> SceneGraph:
+        """The same connections and ways with other nodes; raises SchemaError."""
+        return SceneGraph.of(nodes, self.connections.values(), self.ways)
+
     def check(self) -> None:
-        """One building; each parent present and in an allowed layer; boxes ordered and finite. Raises SchemaError."""
+        """Check the invariants. Raises SchemaError naming what breaks one.
+
+        One building; each parent present and in an allowed layer; boxes ordered and finite; connections and ways of
+        rooms that exist, widths above 0, no length below the straight line.
+        """
         buildings = [node.id for node in self.nodes.values() if node.layer == "building"]
         if len(buildings) != 1:
             raise SchemaError(f"scene graph: expected one building, found {len(buildings)}")
         for node in self.nodes.values():
             self._check_node(node)
+        rooms = frozenset(node.id for node in self.layer("room"))
+        for connection in self.connections.values():
+            check_connection(connection, rooms)
+        for way in self.ways:
+            check_way(way, self.connections, rooms)
+        for node in self.nodes.values():
+            if node.approach is not None:
+                check_approach(f"scene graph node {node.id}", node.approach, self.room_of(node.id), self.connections)
 
     def _check_node(self, node: Node) -> None:
         where = f"scene graph node {node.id}"
@@ -153,12 +194,19 @@ class SceneGraph:
             chain.append(self.nodes[chain[-1].parent])
         return chain[::-1]
 
+    def room_of(self, node_id: str) -> str:
+        """The id of the room that a node is, or is in; "" for a floor and the building."""
+        return next((node.id for node in self.path(node_id) if node.layer == "room"), "")
+
     def to_json(self) -> str:
         """Canonical JSON: sorted keys, lengths to 1 mm, weights to 4 decimals; equal graphs give equal bytes."""
-        nodes = [_node_to_dict(node) for node in self.nodes.values()]
-        return json.dumps(
-            {"version": VERSION, "nodes": nodes}, sort_keys=True, separators=(",", ":"), ensure_ascii=False
-        )
+        document = {
+            "version": VERSION,
+            "nodes": [_node_to_dict(node) for node in self.nodes.values()],
+            "connections": [connection_to_dict(connection) for connection in self.connections.values()],
+            "ways": [way_to_dict(way) for way in self.ways],
+        }
+        return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
     @classmethod
     def from_json(cls, text: str, where: str = "scene graph") -> SceneGraph:
@@ -170,9 +218,14 @@ class SceneGraph:
         if not isinstance(data, dict) or data.get("version") != VERSION:
             found = data.get("version") if isinstance(data, dict) else type(data).__name__
             raise SchemaError(f"{where}: expected graph version {VERSION}, found {found}")
-        if not isinstance(data.get("nodes"), list):
-            raise SchemaError(f"{where}: 'nodes' must be a list")
-        return cls.of(_node_from_dict(entry, f"{where}: nodes[{i}]") for i, entry in enumerate(data["nodes"]))
+        for name in ("nodes", "connections", "ways"):
+            if not isinstance(data.get(name), list):
+                raise SchemaError(f"{where}: '{name}' must be a list")
+        return cls.of(
+            (_node_from_dict(entry, f"{where}: nodes[{i}]") for i, entry in enumerate(data["nodes"])),
+            [connection_from_dict(entry, f"{where}: connections[{i}]") for i, entry in enumerate(data["connections"])],
+            [way_from_dict(entry, f"{where}: ways[{i}]") for i, entry in enumerate(data["ways"])],
+        )
 
     def save(self, path: Path) -> None:
         """Write canonical JSON to a file."""
@@ -194,27 +247,23 @@ def id_key(node_id: str) -> tuple[int, int]:
     return list(LAYERS).index(node_id[0]), int(node_id[1:])
 
 
-def _round(values: Any, digits: int) -> Any:
-    # adding 0.0 turns -0.0 into 0.0, so that equal graphs print alike
-    return (np.round(np.asarray(values, float), digits) + 0.0).tolist()
-
-
 def _node_to_dict(node: Node) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "id": node.id,
         "layer": node.layer,
         "parent": node.parent,
-        "tags": [[tag.name, _round(tag.weight, 4)] for tag in node.tags],
-        "box": _round(node.box, 3),
-        "footprint": _round(node.footprint, 3),
+        "tags": [[tag.name, rounded(tag.weight, 4)] for tag in node.tags],
+        "box": rounded(node.box, 3),
+        "footprint": rounded(node.footprint, 3),
         "first_frame": node.first_frame,
         "last_frame": node.last_frame,
     }
     if node.layer == "object":
         entry |= {
             "observations": node.observations,
-            "oriented_box": _round(node.oriented_box, 3),
+            "oriented_box": rounded(node.oriented_box, 3),
             "color": list(node.color),
+            "approach": approach_to_dict(node.approach),
         }
     return entry
 
@@ -234,6 +283,7 @@ def _node_from_dict(entry: Any, where: str) -> Node:
             observations=int(entry.get("observations", 0)),
             oriented_box=tuple(float(v) for v in entry.get("oriented_box", ())),
             color=tuple(int(v) for v in entry.get("color", ())),
+            approach=approach_from_dict(entry.get("approach")),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SchemaError(f"{where}: {type(error).__name__}: {error}") from None

@@ -14,7 +14,9 @@ from placegraph.tools.graph import dataflow_table, node_types, topic_table
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("configs", "models_onnx", "nodes", "runtime", "tools")
 RING_OF_RUNTIME = {
-    **dict.fromkeys(("errors", "declaration", "messages", "topics", "geometry", "scene_graph"), 0),
+    **dict.fromkeys(
+        ("errors", "declaration", "messages", "topics", "geometry", "place_graph", "scene_graph", "route"), 0
+    ),
     **dict.fromkeys(
         ("codec", "join", "health", "flow", "question", "recording", "node", "surface", "registration", "features"), 1
     ),

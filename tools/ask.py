@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -94,6 +95,11 @@ def _in_words(reply: dict[str, Any]) -> str:
         lines.append(f"{reply['object_id']}  {reply['name']}{'' if reply['sure'] else '  (not sure)'}")
         lines.append(f"where: {path}")
         lines.append(f"box:   {low} to {high} m")
+        if reply["approach"]:
+            degrees = math.degrees(reply["approach"]["yaw_rad"])
+            lines.append(f"stand: at {reply['approach']['position']} m, looking to {degrees:.0f} degrees")
+        if reply["route"]:
+            lines.append(f"way:   {' > '.join(reply['route'])}, {reply['travel_m']} m")
     else:
         lines.append("not in the map")
     lines += [f"  - {sentence}" for sentence in reply["evidence"]]

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from placegraph.nodes.grounding.decide import choose, settle
 from placegraph.nodes.grounding.dictate import dictated
@@ -22,11 +23,15 @@ from placegraph.nodes.grounding.select import Scope, narrow, places_called
 from placegraph.nodes.grounding.words import normal_form, tokens
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
+from placegraph.runtime.place_graph import approach_to_dict
 from placegraph.runtime.question import MODES
+from placegraph.runtime.route import find_route
 from placegraph.runtime.scene_graph import ID_PATTERN, Node, SceneGraph
 
 MOST_OPTIONS = 24  # departs: names of things offered for a purpose; each costs the model 30 to 60 ms
 CHOICE_TOKENS = 48  # a one-field object with a noun phrase is at most 30
+
+NO_WAY: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
 
 
 class Reasoner:
@@ -146,6 +151,7 @@ class Reasoner:
             "evidence": evidence,
             "candidates": [],
             "sure": ranking.sure and not elsewhere,
+            **NO_WAY,
             "viewpoint": {"source": view.source, "xyz": _numbers(view.xyz_world)},
         }
 
@@ -167,6 +173,7 @@ def error_answer(question: Question, revision: int, reason: str) -> dict[str, An
         "evidence": [],
         "candidates": [],
         "sure": False,
+        **NO_WAY,
         "viewpoint": {"source": "asker", "xyz": _numbers(asker)} if given else None,
         "parse": None,
         "revision": revision,
@@ -202,8 +209,19 @@ def _found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure
         "evidence": [*ranking.notes, *best.evidence],
         "candidates": [_candidate(candidate) for candidate in ranking.candidates[:k]],
         "sure": sure,
+        **_way_to(graph, best.node, grounder.asker_world),
         "viewpoint": {"source": view.source, "xyz": _numbers(view.xyz_world)},
     }
+
+
+def _way_to(graph: SceneGraph, node: Node, asker_world: NDArray[np.float64]) -> dict[str, Any]:
+    """Where to stand before a node, and how the asker gets there: rooms and connections in turn, metres."""
+    approach = approach_to_dict(node.approach)
+    found = NO_WAY | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
+    route = find_route(graph, asker_world, node.id) if np.isfinite(asker_world).all() else None
+    if route is None:
+        return found
+    return found | {"route": list(route.ids), "travel_m": _numbers(route.length_m)}
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:

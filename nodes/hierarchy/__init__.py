@@ -9,6 +9,7 @@ from placegraph.models_onnx import LocationDetector
 from placegraph.models_onnx.load import load, wrong_task
 from placegraph.nodes.hierarchy.build import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.floors import FloorConfig
+from placegraph.nodes.hierarchy.ground import TravelConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
 from placegraph.nodes.hierarchy.rooms import RoomConfig
 from placegraph.runtime.errors import SchemaError
@@ -23,6 +24,7 @@ class HierarchyConfig(NodeConfig):
     floors: FloorConfig = FloorConfig()
     rooms: RoomConfig = RoomConfig()
     locations: LocationConfig = LocationConfig()
+    travel: TravelConfig = TravelConfig()
 
 
 class HierarchyNode(Node):
@@ -36,7 +38,7 @@ class HierarchyNode(Node):
 
     def __init__(self, config: HierarchyConfig, context: Context) -> None:
         super().__init__(config, context)
-        layers = LayerConfig(floors=config.floors, rooms=config.rooms, locations=config.locations)
+        layers = LayerConfig(**{name: getattr(config, name) for name in LayerConfig.model_fields})
         self._layers, self._builder = layers, GraphBuilder(layers)
         self._map: Map | None = None
         self._graph: SceneGraph | None = None  # of the newest Map, without names
@@ -86,7 +88,7 @@ def _name_places(graph: SceneGraph, names: PlaceNames) -> SceneGraph:
             raise SchemaError(f"PlaceNames of revision {names.revision}: {node_id!r} is no room or location of it")
         tags.setdefault(node_id, []).append(Tag(name, weight))
     ranked = {node_id: tuple(sorted(found, key=lambda tag: (-tag.weight, tag.name))) for node_id, found in tags.items()}
-    return SceneGraph.of(
+    return graph.with_nodes(
         dataclasses.replace(node, tags=ranked[node.id]) if node.id in ranked else node for node in graph.nodes.values()
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from placegraph.models_onnx import LocationDetector
+from placegraph.nodes.hierarchy.approach import Target
+from placegraph.nodes.hierarchy.connections import FloorPlan, PlacedObject, PlaceGraph, PlaceGraphBuilder
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floors
+from placegraph.nodes.hierarchy.ground import TravelConfig
 from placegraph.nodes.hierarchy.identity import Identities, Place, span_footprint
 from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
 from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, find_rooms
@@ -29,6 +32,7 @@ class LayerConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     floors: FloorConfig = FloorConfig()
     rooms: RoomConfig = RoomConfig()
     locations: LocationConfig = LocationConfig()
+    travel: TravelConfig = TravelConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +51,7 @@ class GraphBuilder:
         """`detector` is the network that config.locations.model names; None where it names none."""
         self._config, self._detector = config, detector
         self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
+        self._places = PlaceGraphBuilder(config.travel, config.floors, config.rooms)
 
     def build(self, world: Map) -> SceneGraph:
         """The graph of a Map; rooms and locations are without names. Deterministic in the sequence of maps.
@@ -72,7 +77,23 @@ class GraphBuilder:
         home = [_home(xyz, rooms) for xyz in objects]
         for room in rooms:
             nodes += self._fill(room, [i for i, at in enumerate(home) if at is room], objects, world)
-        return SceneGraph.of(_with_frames(nodes))
+        nodes = _with_frames(nodes)
+        placed = _placed(nodes, {f"O{number}": room.id for number, room in zip(world.object_ids, home, strict=True)})
+        places = self._connect(world, list(zip(spans, floor_ids, strict=True)), rooms, placed)
+        nodes = [replace(node, approach=places.approaches.get(node.id)) for node in nodes]
+        return SceneGraph.of(nodes, places.connections, places.ways)
+
+    def _connect(
+        self, world: Map, floors: list[tuple[FloorSpan, str]], rooms: list[_Room], objects: list[PlacedObject]
+    ) -> PlaceGraph:
+        points = world.points_world if len(world.points_world) else world.object_points_world
+        plans = []
+        for span, floor_id in floors:
+            here = [room for room in rooms if room.floor == floor_id]
+            inside, free = _in_zone(points, span), _in_zone(world.free_points_world, span)
+            masks = tuple((room.id, room.area.mask) for room in here)
+            plans.append(FloorPlan(floor_id, span, here[0].grid, inside, free, masks))
+        return self._places.build(world, plans, objects)
 
     def _find_rooms(
         self, points: Points, free_points: Points, free_cell_m: float, span: FloorSpan, floor_id: str
@@ -93,6 +114,14 @@ class GraphBuilder:
             box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
         return nodes + [_object(i, parent[i], objects[i], world) for i in members]
+
+
+def _placed(nodes: list[Node], room_of: dict[str, str]) -> list[PlacedObject]:
+    return [
+        PlacedObject(node.id, room_of[node.id], Target(node.footprint, node.center))
+        for node in nodes
+        if node.id in room_of
+    ]
 
 
 def _check(world: Map) -> None:

@@ -24,6 +24,9 @@ LAYER_COLORS: dict[str, Color] = {
 OUTLINES = {"floor": "floors", "room": "rooms", "location": "locations"}
 OUTLINE_RAISE_M = {"floor": 0.0, "room": 0.02, "location": 0.04}  # they share the floor's height: none hides another
 OUTLINE_RADIUS_M = {"floor": 0.01, "room": 0.02, "location": 0.012}
+CONNECTION_COLORS: dict[str, Color] = {"door": (255, 120, 220), "opening": (255, 180, 235), "stairs": (255, 90, 90)}
+WAY_COLOR: Color = (200, 120, 190)
+CONNECTION_RAISE_M = 0.06
 ANSWER_COLOR: Color = (255, 230, 0)
 
 
@@ -36,6 +39,7 @@ def draw_graph(picture: Picture, graph: m.Graph, pngs: dict[str, bytes]) -> None
         if node.layer in OUTLINES
     }
     picture.replace("outlines", outlines)
+    draw_connections(picture, scene)
     nodes = list(scene.nodes.values())
     positions = _tree_positions(scene)
     drawn = rr.GraphNodes(
@@ -47,6 +51,32 @@ def draw_graph(picture: Picture, graph: m.Graph, pngs: dict[str, bytes]) -> None
     )
     edges = rr.GraphEdges([(node.parent, node.id) for node in nodes if node.parent], graph_type="directed")
     picture.log("graph", drawn, edges)
+
+
+def draw_connections(picture: Picture, scene: SceneGraph) -> None:
+    """Doors and openings as discs of their width, stairs as a line, the ways between them in one thin net."""
+    drawn: dict[str, Any] = {}
+    for one in scene.connections.values():
+        look: dict[str, Any] = {
+            "colors": [CONNECTION_COLORS[one.kind]],
+            "labels": [f"{one.id} {one.kind}"],
+            "show_labels": True,
+        }
+        ends = one.ends + np.array([0, 0, CONNECTION_RAISE_M])
+        if one.kind == "stairs":
+            drawn[f"world/connections/{one.id}"] = rr.LineStrips3D([ends], radii=[0.03], **look)
+        else:
+            half = np.array([[one.width_m / 2, one.width_m / 2, 0.01]])
+            drawn[f"world/connections/{one.id}"] = rr.Ellipsoids3D(centers=ends[:1], half_sizes=half, **look)
+    if scene.ways:
+        strips = [
+            np.column_stack(
+                (way.points, np.full(len(way.points), scene.nodes[way.room].box[0, 2] + CONNECTION_RAISE_M))
+            )
+            for way in scene.ways
+        ]
+        drawn["world/ways"] = rr.LineStrips3D(strips, colors=[WAY_COLOR], radii=[0.006])
+    picture.replace("connections", drawn)
 
 
 def _label(node: Node) -> str:

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ from placegraph.nodes.recorder.picture import color_of, markdown
 from placegraph.runtime import messages as m
 from placegraph.runtime.errors import ConfigError, SchemaError
 from placegraph.runtime.node import Context
+from placegraph.runtime.place_graph import Connection, Way
 from placegraph.runtime.recording import kinds_in, properties, read
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.topics import TOPICS
@@ -325,6 +327,25 @@ def test_places_are_outlines_at_the_floor(play: Play) -> None:
     assert cleared["Clear:is_recursive"] == [False]
     assert entities["/world/locations/L1"][0]["LineStrips3D:labels"] == ["L1 location"]
     assert len([row for row in entities["/world/floors/F0"] if row.get("LineStrips3D:strips")]) == 2
+
+
+def test_connections_are_discs_and_lines_and_vanish_with_the_next_graph(play: Play) -> None:
+    nodes = [place("F0", "B0", "floor 1"), place("R2", "F0"), place("R3", "F0")]
+    fields: dict[str, Any] = {"rooms": ("R2", "R3"), "width_m": 0.9}
+    door = Connection(id="C0", kind="door", ends=np.array([[1.0, 2, 0.5]] * 2), length_m=0.0, **fields)
+    climb = Connection(id="C1", kind="stairs", ends=np.array([[1.0, 2, 0.5], [4, 2, 3]]), length_m=4.0, **fields)
+    way = Way(room="R2", ends=("C0", "R2"), length_m=2.0, points=np.array([[1.0, 2], [3, 2]]))
+    first = graph(*nodes)
+    joined = SceneGraph.from_json(first.json).nodes.values()
+    shown = dataclasses.replace(first, json=SceneGraph.of(joined, [door, climb], [way]).to_json())
+    entities = play([shown, graph(*nodes, frame_id=5)])
+    disc, cleared = entities["/world/connections/C0"]
+    assert disc["Ellipsoids3D:labels"] == ["C0 door"] and cleared["Clear:is_recursive"] == [False]
+    assert disc["Ellipsoids3D:half_sizes"][0][:2] == pytest.approx([0.45, 0.45])
+    (strip,) = entities["/world/connections/C1"][0]["LineStrips3D:strips"]
+    assert [point[2] for point in strip] == pytest.approx([0.56, 3.06])
+    (line,) = entities["/world/ways"][0]["LineStrips3D:strips"]
+    assert [point[:2] for point in line] == [[1, 2], [3, 2]]
 
 
 def test_the_graph_is_a_tree_without_nodes_on_top_of_each_other(play: Play) -> None:

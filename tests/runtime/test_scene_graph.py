@@ -78,11 +78,12 @@ def test_rounding_and_minus_zero() -> None:
     ("text", "problem"),
     [
         ("", "not JSON"),
-        ("[]", "expected graph version 1, found list"),
-        ('{"version": 2}', "expected graph version 1, found 2"),
-        ('{"version": 1}', "'nodes' must be a list"),
-        ('{"version": 1, "nodes": [3]}', r"nodes\[0\]: TypeError"),
-        ('{"version": 1, "nodes": [{"id": "B0"}]}', r"nodes\[0\]: KeyError: 'parent'"),
+        ("[]", "expected graph version 2, found list"),
+        ('{"version": 1}', "expected graph version 2, found 1"),
+        ('{"version": 3}', "expected graph version 2, found 3"),
+        ('{"version": 2}', "'nodes' must be a list"),
+        ('{"version": 2, "nodes": [3], "connections": [], "ways": []}', r"nodes\[0\]: TypeError"),
+        ('{"version": 2, "nodes": [{"id": "B0"}], "connections": [], "ways": []}', r"nodes\[0\]: KeyError: 'parent'"),
     ],
 )
 def test_bad_files(tmp_path: Path, text: str, problem: str) -> None:

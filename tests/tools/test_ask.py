@@ -8,7 +8,7 @@ from placegraph.runtime.scene_graph import SceneGraph
 
 KEYS = {
     "status", "question_id", "question", "object_id", "name", "box", "center", "path", "evidence", "candidates", "sure",
-    "parse", "viewpoint", "revision", "llm_calls", "ms",
+    "parse", "viewpoint", "revision", "llm_calls", "ms", "approach", "route", "travel_m",
 }  # fmt: skip
 
 
@@ -32,6 +32,9 @@ def test_found_in_words(cli, mapped) -> None:
     assert lines[0].startswith(f"{reply['object_id']}  chair") and lines[1].startswith("where: building (B0) > ")
     assert lines[2] == f"box:   {reply['box'][0]} to {reply['box'][1]} m"
     assert lines[-1].startswith(f"candidates: {reply['object_id']} chair ")
+    from_here = cli("ask", mapped, "a chair", "--viewpoint", "1,1,1.4").out.splitlines()
+    assert sum(line.startswith("way:   R") and line.endswith(" m") for line in from_here) == 1
+    assert not any(line.startswith("way:") for line in lines)
 
 
 def test_k_limits_the_candidates(cli, mapped) -> None:
@@ -95,7 +98,7 @@ def test_a_folder_without_a_map(cli, tmp_path) -> None:
 def test_a_map_of_another_version(cli, mapped, tmp_path) -> None:
     (tmp_path / "graph.json").write_text('{"version": 99, "nodes": []}')
     done = cli("ask", tmp_path, "chair")
-    assert (done.code, done.reason) == (1, f"{tmp_path / 'graph.json'}: expected graph version 1, found 99")
+    assert (done.code, done.reason) == (1, f"{tmp_path / 'graph.json'}: expected graph version 2, found 99")
     shutil.copy(mapped / "graph.json", tmp_path / "graph.json")
     (tmp_path / "run.json").write_text('{"config": {"nodes": {"grounding": {}}, "walls": 1}}')
     done = cli("ask", tmp_path, "chair")

@@ -44,18 +44,18 @@ def test_the_tree_of_a_map_shows_every_node_below_its_parent(cli, mapped) -> Non
 def test_json_is_the_file(cli, mapped) -> None:
     text = (mapped / "graph.json").read_text()
     assert cli("graph", mapped, "--json").out == cli("graph", mapped / "graph.json", "--json").out == text
-    assert json.loads(text)["version"] == 1
+    assert json.loads(text)["version"] == 2
 
 
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
         ("", "not JSON"),
-        ("[]", "expected graph version 1, found list"),
-        ('{"version": 99, "nodes": []}', "expected graph version 1, found 99"),
-        ('{"version": 1}', "'nodes' must be a list"),
-        ('{"version": 1, "nodes": []}', "building"),
-        ('{"version": 1, "nodes": [{"id": "X1"}]}', "is not an id"),
+        ("[]", "expected graph version 2, found list"),
+        ('{"version": 99, "nodes": []}', "expected graph version 2, found 99"),
+        ('{"version": 2}', "'nodes' must be a list"),
+        ('{"version": 2, "nodes": [], "connections": [], "ways": []}', "building"),
+        ('{"version": 2, "nodes": [{"id": "X1"}], "connections": [], "ways": []}', "is not an id"),
     ],
 )
 def test_a_file_that_is_no_graph_is_named(cli, tmp_path, content, reason) -> None:

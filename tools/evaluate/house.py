@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placegraph.runtime.errors import SourceError
+from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.aligned_map import AlignedMap, MapPlace, read_aligned
+from placegraph.tools.evaluate.connections import connection_scores
 from placegraph.tools.evaluate.grounding import ask_all, grounding_scores, read_questions
 from placegraph.tools.evaluate.objects import object_scores, seen_well
 from placegraph.tools.evaluate.places import (
@@ -26,7 +28,7 @@ from placegraph.tools.evaluate.places import (
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
 from placegraph.tools.house.space import inside
 from placegraph.tools.house.truth import TrueLocation, TrueRoom, Truth, read_truth
-from placegraph.tools.map_folder import TRAJECTORY, read_trajectory
+from placegraph.tools.map_folder import TRAJECTORY, find_graph, read_trajectory
 
 F64 = NDArray[np.float64]
 
@@ -51,6 +53,10 @@ def house_scores(folder: Path, source: Path, given: dict[int, F64] | None, quest
         "locations": _locations(aligned, truth, _floor_of(aligned, pairs)),
         "objects": object_scores(aligned.objects, truth.objects, truth.seen),
     }
+    if truth.connections is not None:
+        graph = SceneGraph.load(find_graph(folder))
+        seen = frozenset(one.id for one in _seen_rooms(truth, true))
+        found["connections"] = connection_scores(graph, true_from_map, truth, seen)
     if questions:
         asked = read_questions(source)
         if not asked:
@@ -78,8 +84,7 @@ def _floors(found: int, true: int, pairs: Sequence[tuple[int, int, float]]) -> d
 
 def _rooms(aligned: AlignedMap, truth: Truth, positions: F64, floor_of: list[int]) -> dict[str, Any]:
     """Rooms that the walk entered, or of which it saw an object well."""
-    looked_into = {one.room for one, seen in zip(truth.objects, truth.seen, strict=True) if seen_well(seen)}
-    true = [one for one in truth.rooms if one.id in looked_into or _entered(one, truth, positions)]
+    true = _seen_rooms(truth, positions)
     met = overlaps(_areas(aligned.rooms, floor_of), [(one.floor, one.polygon) for one in true])
     scores, (hydra_precision, hydra_recall) = matched(met.iou, 0.5), hydra(met)
     return {
@@ -92,6 +97,11 @@ def _rooms(aligned: AlignedMap, truth: Truth, positions: F64, floor_of: list[int
         "hydra_precision": hydra_precision,
         "hydra_recall": hydra_recall,
     }
+
+
+def _seen_rooms(truth: Truth, positions: F64) -> list[TrueRoom]:
+    looked_into = {one.room for one, seen in zip(truth.objects, truth.seen, strict=True) if seen_well(seen)}
+    return [one for one in truth.rooms if one.id in looked_into or _entered(one, truth, positions)]
 
 
 def _entered(room: TrueRoom, truth: Truth, positions: F64) -> bool:

@@ -53,6 +53,8 @@ def house_text(scores: dict[str, Any], per_class: bool) -> str:
             f"names      AUC top-k {number(top['auc'])} of {top['objects']} objects and {top['classes']} classes; "
             f"{curve}"
         )
+    if "connections" in scores:
+        lines += _connections(scores["connections"])
     if per_class:
         heads = ("truth", "found", "map", "wrong")
         rows_of = [(name, *(str(row[head]) for head in heads)) for name, row in things["classes"].items()]
@@ -69,3 +71,21 @@ def _questions(scores: dict[str, Any]) -> str:
         cells = (str(row[head]) if isinstance(row[head], int) else number(row[head], 2) for head in heads)
         rows.append((form, *cells))
     return table(rows)
+
+
+def _connections(scores: dict[str, Any]) -> list[str]:
+    """Scores as connections.connection_scores gives them."""
+    travel = scores["travel"]
+    lines = []
+    for name in ("doors", "stairs"):
+        row, error = scores[name], number(scores[name]["width_error_m"], 2)
+        lines.append(
+            f"{name.ljust(11)}{row['truth']} of {row['of']} between rooms seen, {row['map']} in the map: precision "
+            f"{number(row['precision'])}, recall {number(row['recall'])}, width off by {error} m"
+        )
+    ratios = f"{number(travel['least_ratio'], 2)} to {number(travel['largest_ratio'], 2)}"
+    return [
+        *lines,
+        f"travel     {number(travel['mean_ratio'])} of the true length on average between {travel['pairs']} pairs of "
+        f"them on one floor, {ratios}",
+    ]

@@ -1,7 +1,8 @@
 """Scene graph as the JSON of spark_dsg (MIT-SPARK), which Hydra and its tools read.
 
 Layers: OBJECTS 2, PLACES 3 (our locations), ROOMS 4, FLOORS 5, BUILDINGS 6; a node's symbol is the letter and number
-of its id. Names of objects are a labelspace of their layer. Source: files that spark_dsg 1.1.3 wrote.
+of its id. Rooms that a door, an opening or stairs join have an edge. Names of objects are a labelspace of their layer.
+Source: files that spark_dsg 1.1.3 wrote.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from placegraph.runtime.route import find_route
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 LAYERS = {"object": 2, "location": 3, "room": 4, "floor": 5, "building": 6}
@@ -38,8 +40,23 @@ def document(graph: SceneGraph) -> dict[str, Any]:
         "layer_names": {NAMES[layer]: key for layer, key in keys.items()},
         "metadata": {"labelspaces": {f"_l{LAYERS['object']}p0": [[k, name] for name, k in labels.items()]}},
         "nodes": [keys[n.layer] | {"id": symbol(n.id), "attributes": _attributes(n, labels)} for n in nodes],
-        "edges": [{"source": symbol(n.parent), "target": symbol(n.id), "info": _edge()} for n in nodes if n.parent],
+        "edges": [{"source": symbol(n.parent), "target": symbol(n.id), "info": _edge()} for n in nodes if n.parent]
+        + _passages(graph),
     }
+
+
+def _passages(graph: SceneGraph) -> list[dict[str, Any]]:
+    """An edge between each two rooms that connections join; its weight: the metres from middle to middle."""
+    joined: dict[tuple[str, str], list[str]] = {}
+    for one in graph.connections.values():
+        joined.setdefault((one.rooms[0], one.rooms[1]), []).append(one.id)
+    edges = []
+    for (a, b), ids in joined.items():
+        route = find_route(graph, a, b)
+        length = None if route is None else round(route.length_m, 3)
+        info = _edge() | {"weighted": length is not None, "metadata": {"connections": ids}}
+        edges.append({"source": symbol(a), "target": symbol(b), "info": info | ({"weight": length} if length else {})})
+    return edges
 
 
 def symbol(node_id: str) -> int:

@@ -1,4 +1,4 @@
-"""Floor plans as one SVG: a drawing a floor, side by side, in metres; rooms, locations and objects by name."""
+"""Floor plans as one SVG: a drawing a floor, in metres: rooms, locations, objects, doors and stairs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from placegraph.runtime.place_graph import Connection
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 MARGIN_M = 0.6
@@ -18,6 +19,7 @@ STYLE = (
     ".room{stroke:#4a484e;stroke-width:.06}"
     ".location{fill:none;stroke:#7a8fb0;stroke-width:.03;stroke-dasharray:.12 .08}"
     ".object{fill:#ffffffb0;stroke:#d6425f;stroke-width:.02}"
+    ".door{fill:#d642b5a0;stroke:none}.stairs{stroke:#d6425f;stroke-width:.08}"
     ".title{font-size:.34px}.place{font-size:.24px;font-weight:bold}.name{font-size:.13px}"
 )
 
@@ -61,6 +63,12 @@ def _shapes(graph: SceneGraph, floor: Node) -> Iterator[str]:
         yield _polygon("location", location)
     for thing in graph.descendants(floor.id, "object"):
         yield _polygon("object", thing)
+    for connection in graph.connections.values():
+        for room_id, end in zip(connection.rooms, connection.ends, strict=True):
+            if graph.nodes[room_id].parent == floor.id:
+                yield _passage(connection, end)
+                if connection.kind != "stairs":  # both ends are the same, on the same floor
+                    break
 
 
 def _labels(graph: SceneGraph, floor: Node, x: float, y: float) -> Iterator[str]:
@@ -68,6 +76,16 @@ def _labels(graph: SceneGraph, floor: Node, x: float, y: float) -> Iterator[str]
         yield _text("name", x + thing.center[0], y - thing.center[1], thing.name)
     for room in graph.descendants(floor.id, "room"):
         yield _text("place", x + room.center[0], y - room.center[1], f"{room.id} {room.name}")
+
+
+def _passage(connection: Connection, end: np.ndarray) -> str:
+    """A disc of the passage's width; for stairs a line in plan from this floor's end to the other's."""
+    title = f"<title>{escape(f'{connection.id} {connection.kind}')}</title>"
+    if connection.kind != "stairs":
+        x, y, radius = end[0], end[1], connection.width_m / 2
+        return f'<circle class="door" cx="{x:.3f}" cy="{y:.3f}" r="{radius:.3f}">{title}</circle>'
+    (x0, y0), (x1, y1) = connection.ends[:, :2].tolist()
+    return f'<line class="stairs" x1="{x0:.3f}" y1="{y0:.3f}" x2="{x1:.3f}" y2="{y1:.3f}">{title}</line>'
 
 
 def _polygon(kind: str, node: Node, more: str = "") -> str:

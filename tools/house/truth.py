@@ -16,6 +16,7 @@ from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAda
 
 from placegraph.runtime.errors import SourceError
 from placegraph.tools.house.model import House, Item, PlacedItem
+from placegraph.tools.house.passages import passages
 
 F64 = NDArray[np.float64]
 
@@ -45,6 +46,7 @@ def _shape(*shape: int) -> PlainValidator:
 
 Point = Annotated[F64, _shape(3), _AS_LISTS]
 Box = Annotated[F64, _shape(2, 3), _AS_LISTS]
+Ends = Box  # two points
 Footprint = Annotated[F64, _shape(4, 2), _AS_LISTS]
 Polygon = Annotated[F64, _shape(-1, 2), _AS_LISTS]
 
@@ -124,6 +126,19 @@ class TrueLocation:
     outline: Polygon
 
 
+@dataclass(frozen=True, eq=False)
+class TrueConnection:
+    """A door, archway or stairs; fields as in passages.Passage."""
+
+    __pydantic_config__ = _STRICT
+    id: int
+    kind: str
+    rooms: tuple[int, int]
+    ends: Ends
+    width_m: float
+    travel_m: tuple[tuple[int, float], ...]
+
+
 @dataclass(frozen=True)
 class Seen:
     """In how many frames an object is in the picture, and in how many clearly: with `CLEAR_SHARE` of it or more."""
@@ -144,6 +159,7 @@ class Truth:
     floors: tuple[TrueFloor, ...]
     locations: tuple[TrueLocation, ...]
     seen: tuple[Seen, ...]  # one for each object, by id
+    connections: tuple[TrueConnection, ...] | None = None  # None: the folder says nothing of them
 
 
 _FILES: dict[str, TypeAdapter[Any]] = {
@@ -153,6 +169,7 @@ _FILES: dict[str, TypeAdapter[Any]] = {
     "floors": TypeAdapter(tuple[TrueFloor, ...]),
     "locations": TypeAdapter(tuple[TrueLocation, ...]),
     "seen": TypeAdapter(tuple[Seen, ...]),
+    "connections": TypeAdapter(tuple[TrueConnection, ...]),
 }
 
 
@@ -168,6 +185,9 @@ def truth_of(house: House, run: HouseRun, seen: tuple[Seen, ...]) -> Truth:
             TrueLocation(place.id, place.kind, place.room, place.members, place.outline) for place in house.locations
         ),
         seen=seen,
+        connections=tuple(
+            TrueConnection(one.id, one.kind, one.rooms, one.ends, one.width_m, one.travel_m) for one in passages(house)
+        ),
     )
 
 
@@ -194,6 +214,8 @@ def write_truth(truth: Truth, folder: Path) -> None:
     """Write truth/*.json into a folder: sorted keys, rounded, so that equal truths are equal bytes."""
     (folder / TRUTH).mkdir(exist_ok=True)
     for name, adapter in _FILES.items():
+        if getattr(truth, name) is None:
+            continue
         values = _rounded(adapter.dump_python(getattr(truth, name), mode="json", by_alias=True))
         text = json.dumps(values, sort_keys=True, ensure_ascii=False, allow_nan=False, indent=1)
         (folder / TRUTH / f"{name}.json").write_text(text + "\n", encoding="utf-8")
@@ -201,7 +223,10 @@ def write_truth(truth: Truth, folder: Path) -> None:
 
 def read_truth(dir: Path) -> Truth:
     """Read what write_truth wrote; raises SourceError naming the file and the field that is missing or damaged."""
-    truth = Truth(**{field.name: _read(dir / TRUTH / f"{field.name}.json", field.name) for field in fields(Truth)})
+    files = {field.name: dir / TRUTH / f"{field.name}.json" for field in fields(Truth)}
+    # houses made before connections were truth, and truths that others bring, may lack them
+    kept = {name: file for name, file in files.items() if name != "connections" or file.exists()}
+    truth = Truth(**{name: _read(file, name) for name, file in kept.items()})
     ids = [one.id for one in truth.objects]
     if ids != list(range(len(ids))) or [one.id for one in truth.seen] != ids:
         raise SourceError(f"{dir / TRUTH}: objects.json and seen.json do not hold the same objects, counted from 0")

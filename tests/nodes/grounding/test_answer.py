@@ -1,3 +1,4 @@
+import dataclasses
 import json
 
 import numpy as np
@@ -5,10 +6,12 @@ import pytest
 
 from placegraph.nodes.grounding import NODE, GroundingConfig
 from placegraph.runtime.node import Context
+from placegraph.runtime.place_graph import Approach, Connection
+from placegraph.runtime.scene_graph import SceneGraph
 
 KEYS = {
     "status", "question", "question_id", "object_id", "name", "box", "center", "path", "evidence", "candidates", "sure",
-    "viewpoint", "parse", "revision", "llm_calls",
+    "viewpoint", "parse", "revision", "llm_calls", "approach", "route", "travel_m",
 }  # fmt: skip
 
 
@@ -64,6 +67,26 @@ def test_the_viewpoint_turns_left_into_right(node, ask):
     north = ask(node, "the chair left of the table", viewpoint=(2, 7, 1.5))
     assert (south["object_id"], north["object_id"]) == ("O3", "O4")
     assert south["viewpoint"] == {"source": "asker", "xyz": [2, -3, 1.5]}
+
+
+def test_the_answer_says_where_to_stand_and_how_to_get_there(house, graph_message, ask):
+    nodes = [
+        dataclasses.replace(one, approach=Approach((2.0, 1.6, 2.8), 1.571, (("C0", 1.5),))) if one.id == "O15" else one
+        for one in house.nodes.values()
+    ]
+    ends = np.array([[3.5, 3.5, 0], [3.5, 1.6, 2.8]])
+    stairs = Connection(id="C0", kind="stairs", rooms=("R0", "R2"), ends=ends, width_m=0.9, length_m=4.0)
+    node = NODE(GroundingConfig(name_places=False, use_model=False), Context())
+    node.step(graph_message(SceneGraph.of(nodes, [stairs])))
+    answer = ask(node, "where is the bed?", viewpoint=(0.5, 3.5, 1.5))
+    assert answer["approach"] == {"position": [2.0, 1.6, 2.8], "yaw_rad": 1.571}
+    assert (answer["route"], answer["travel_m"]) == (["R0", "C0", "R2"], 3.0 + 4.0 + 1.5)
+    unasked = ask(node, "where is the bed?")
+    assert unasked["approach"] == answer["approach"] and (unasked["route"], unasked["travel_m"]) == ([], None)
+    far = ask(node, "where is the bed?", viewpoint=(8.0, 1.0, 1.5))  # from the living room no way is known
+    assert far["approach"] and (far["route"], far["travel_m"]) == ([], None)
+    cup = ask(node, "the white cup", viewpoint=(0.5, 3.5, 1.5))
+    assert (cup["approach"], cup["route"], cup["travel_m"]) == (None, [], None)
 
 
 def test_not_in_the_map_says_what_is(node, ask):

@@ -6,8 +6,9 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.export import dsg
+from placegraph.runtime.place_graph import Connection
+from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.tools.export import dsg, svg
 from placegraph.tools.map_folder import read_cloud, read_object_clouds
 from placegraph.tools.ply import write_points
 from placegraph.tools.rooms import read_map
@@ -25,7 +26,10 @@ def test_spark_dsg_loads_every_node_box_name_and_edge(cli, mapped, graph, tmp_pa
     out = tmp_path / "dsg.json"
     assert cli("export", mapped, "dsg", "--out", out).code == 0
     found = spark_dsg.DynamicSceneGraph.load(str(out))
-    assert found.num_nodes() == len(graph.nodes) and found.num_edges() == len(graph.nodes) - 1
+    joined = {one.rooms for one in graph.connections.values()}
+    assert found.num_nodes() == len(graph.nodes) and found.num_edges() == len(graph.nodes) - 1 + len(joined)
+    for a, b in joined:
+        assert found.has_edge(dsg.symbol(a), dsg.symbol(b))
     for node in graph.nodes.values():
         there = found.get_node(dsg.symbol(node.id))
         assert there.id.str(False) == f"{node.id[0]}({node.id[1:]})" and there.layer.layer == dsg.LAYERS[node.layer]
@@ -57,6 +61,30 @@ def test_the_plan_draws_every_place_and_object_where_it_is(cli, mapped, graph, t
             points = np.array([pair.split(",") for pair in shape.get("points").split()], float)
             on_sheet = np.array([x, y]) + points * [1, -1]
             assert (on_sheet >= 0).all() and (on_sheet <= [width, height]).all()
+
+
+def test_the_plan_marks_doors_on_their_floor_and_stairs_on_both():
+    def node(id, parent, z=0.0):
+        box = np.array([[0, 0, z], [4, 4, z + 2.6]])
+        return Node(id=id, parent=parent, tags=(), box=box, footprint=box[:, :2], first_frame=0, last_frame=0)
+
+    nodes = [
+        node("B0", ""),
+        node("F0", "B0"),
+        node("F1", "B0", 3),
+        node("R0", "F0"),
+        node("R1", "F0"),
+        node("R2", "F1", 3),
+    ]
+    kept = {"width_m": 0.9, "length_m": 5.0}
+    door = Connection(id="C0", kind="door", rooms=("R0", "R1"), ends=np.array([[2.0, 1, 0]] * 2), **kept)
+    stairs = Connection(id="C1", kind="stairs", rooms=("R0", "R2"), ends=np.array([[1.0, 1, 0], [3, 1, 3]]), **kept)
+    root = ElementTree.fromstring(svg.drawing(SceneGraph.of(nodes, [door, stairs])))
+    lower, upper = root.findall(f"{SVG}g")
+    (disc,) = root.iter(f"{SVG}circle")
+    assert (disc.get("cx"), disc.get("cy"), disc.get("r")) == ("2.000", "1.000", "0.450") and disc in list(lower)
+    lines = [floor.findall(f"{SVG}line") for floor in (lower, upper)]
+    assert [[line.get("x1") for line in found] for found in lines] == [["1.000"], ["1.000"]]
 
 
 def test_ros_maps_have_walls_and_free_rooms_in_the_world_frame(cli, mapped, graph, tmp_path):

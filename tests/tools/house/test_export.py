@@ -67,7 +67,7 @@ def test_another_seed_gives_other_bytes(folder: Path, tmp_path: Path):
 
 def test_the_folder_holds_what_is_promised(folder: Path):
     numbers = [f"{index:06d}" for index in range(3)]
-    truth = ("floors", "house", "locations", "objects", "questions", "rooms", "seen")
+    truth = ("connections", "floors", "house", "locations", "objects", "questions", "rooms", "seen")
     assert set(files(folder)) == {
         *("calibration.txt", "depth.txt", "groundtruth.txt", "plan.png", "rgb.txt"),
         *(f"rgb/{n}.jpg" for n in numbers),
