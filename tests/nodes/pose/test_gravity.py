@@ -52,3 +52,9 @@ def test_only_a_wall_is_no_level_plane() -> None:
     random = np.random.default_rng(0)
     wall = np.column_stack((random.uniform(-2, 2, (500, 2)), random.normal(2, 0.002, 500))).astype(np.float32)
     assert not gravity.find_up([(np.eye(4), UNKNOWN, wall)], 0).reliable
+
+
+@pytest.mark.parametrize(("roll", "up"), [(0, (0, -1, 0)), (90, (-1, 0, 0)), (180, (0, 1, 0)), (270, (1, 0, 0))])
+def test_a_turned_mount_turns_up(roll: int, up: tuple[int, int, int]) -> None:
+    blind = [(np.eye(4), np.full(3, np.nan), np.zeros((0, 3), np.float32))]
+    assert np.allclose(gravity.find_up(blind, 0, np.deg2rad(roll)).up, up)
