@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from placegraph.nodes.hierarchy.approach import Stand, Target, find_stand
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan
-from placegraph.nodes.hierarchy.ground import Bool, Ground, TravelConfig, find_ground
+from placegraph.nodes.hierarchy.ground import Bool, Ground, TravelConfig, deep_points, find_ground
 from placegraph.nodes.hierarchy.identity import Identities, Place
 from placegraph.nodes.hierarchy.openings import Opening, find_openings, owners
 from placegraph.nodes.hierarchy.rooms import Grid, RoomConfig
@@ -66,6 +66,8 @@ class _Floor:
     plan: FloorPlan
     ground: Ground
     owner: I32
+    openings: list[Opening]
+    made_of: tuple[Points | Bool, ...]  # equal inputs: nothing to compute again
 
     def at(self, cell: tuple[int, int]) -> F64:
         middle = self.plan.grid.origin + (np.array(cell[::-1]) + 0.5) * self.plan.grid.cell_m
@@ -107,6 +109,7 @@ class PlaceGraphBuilder:
     def __init__(self, config: TravelConfig, floors: FloorConfig, rooms: RoomConfig) -> None:
         self._config, self._floor_config, self._door_m = config, floors, rooms.door_m
         self._identities = Identities("C")
+        self._floors: dict[str, _Floor] = {}
         self._rooms: dict[str, _Room] = {}
 
     def build(self, world: Map, plans: Sequence[FloorPlan], objects: Sequence[PlacedObject]) -> PlaceGraph:
@@ -114,6 +117,7 @@ class PlaceGraphBuilder:
         spans = [plan.span for plan in plans]
         standing = floors_stood_on(world.camera_positions_world, spans, self._floor_config, self._config)
         floors = [self._floor(world, plan, number, standing) for number, plan in enumerate(plans)]
+        self._floors = {floor.plan.id: floor for floor in floors}
         portals = [portal for floor in floors for portal in self._openings(floor)]
         stairs = find_stairs(world.camera_positions_world, standing, spans, world.points_world, self._config)
         portals += [portal for one in stairs if (portal := self._stairs(one, floors)) is not None]
@@ -136,11 +140,24 @@ class PlaceGraphBuilder:
 
     def _floor(self, world: Map, plan: FloorPlan, number: int, standing: NDArray[np.int64]) -> _Floor:
         steps = steps_on(number, world.camera_positions_world, standing, self._config)
+        deep = deep_points(world.points_world, plan.span, self._config)
+        masks = [mask for _, mask in plan.rooms]
+        made_of = (plan.points_world, deep, plan.free_points_world, steps, plan.grid.origin, *masks)
+        known = self._floors.get(plan.id)
+        if known is not None and known.plan.span == plan.span and _equal(known.made_of, made_of):
+            return _Floor(plan, known.ground, known.owner, known.openings, made_of)
         ground = find_ground(
-            plan.points_world, world.points_world, plan.free_points_world, world.free_cell_m, steps,
-            plan.grid, plan.span, self._config,
-        )  # fmt: skip
-        return _Floor(plan, ground, owners([mask for _, mask in plan.rooms], ground, self._config))
+            plan.points_world,
+            deep,
+            plan.free_points_world,
+            world.free_cell_m,
+            steps,
+            plan.grid,
+            plan.span,
+            self._config,
+        )
+        owner = owners(masks, ground, self._config)
+        return _Floor(plan, ground, owner, find_openings(owner, ground, self._config), made_of)
 
     def _openings(self, floor: _Floor) -> list[_Portal]:
         def portal(opening: Opening) -> _Portal:
@@ -150,7 +167,7 @@ class PlaceGraphBuilder:
             cells = (opening.cell, opening.cell)
             return _Portal(kind, (one, other), cells, ends, opening.width_m, 0.0, floor.plan.id, opening.meeting)
 
-        return [portal(opening) for opening in find_openings(floor.owner, floor.ground, self._config)]
+        return [portal(opening) for opening in floor.openings]
 
     def _stairs(self, stairs: Stairs, floors: Sequence[_Floor]) -> _Portal | None:
         """Stairs between the rooms in which they end; None where an end lies in no room."""
@@ -210,6 +227,10 @@ class PlaceGraphBuilder:
             travel = sorted((end, length) for end, length in zip(ends, lengths, strict=True) if np.isfinite(length))
             found[thing.id] = Approach((x, y, z), stand.yaw_rad, tuple(travel))
         return found
+
+
+def _equal(one: Sequence[Points | Bool], other: Sequence[Points | Bool]) -> bool:
+    return len(one) == len(other) and all(map(np.array_equal, one, other))
 
 
 def _same(one: Target, other: Target) -> bool:

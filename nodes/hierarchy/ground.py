@@ -62,7 +62,7 @@ class Ground:
 
 def find_ground(
     points_world: Points,
-    points_below_world: Points,
+    deep_points_world: Points,
     free_points_world: Points,
     free_cell_m: float,
     steps_world: F64,
@@ -73,30 +73,44 @@ def find_ground(
     """The ground of one floor.
 
     points_world (P, 3) and free_points_world (F, 3), centres of cells seen through, of the floor's zone;
-    points_below_world: (Q, 3) what lies below the floor's height; steps_world: (K, 2, 3) pieces of the camera's path
-    while it stood on this floor. All metres, world frame; free_cell_m: size of the free cells in plan.
+    deep_points_world: (Q, 3) see `deep_points`; steps_world: (K, 2, 3) pieces of the camera's path while it stood on
+    this floor. All metres, world frame; free_cell_m: size of the free cells in plan.
     """
     above = points_world[:, 2] - span.low
     solid = (above > config.step_m) & (above < config.robot_height_m)
-    obstacle = _obstacles(_count(points_world[solid], grid), config)
+    things = points_world[solid]
+    obstacle = _obstacles(_count(things, grid), config)
     path = _path(steps_world, grid)
     free = _free(free_points_world, free_cell_m, grid, span, config)
     floor = _count(points_world[np.abs(above) <= config.floor_band_m], grid) > 0
     floor = _closed(floor, round(config.close_m / grid.cell_m))
-    floor |= _blind(path, points_below_world, grid, span, config)
+    floor |= _blind(path, deep_points_world, grid, config)
     # the camera was carried here: the robot's width around its path is free, too, but for what was seen to stand there
     crossed = _grown(path, config.robot_radius_m / grid.cell_m + 1)
     passable = ((floor & free) | crossed) & ~obstacle | path
     clearance = _clearance(passable, grid.cell_m)
-    tops = np.zeros(grid.shape, np.uint8)
-    np.maximum.at(tops, grid.cells(points_world[solid]), np.ceil(above[solid] / LEVEL_M).astype(np.uint8))
+    tops = _tops(things, above[solid], grid)
     return Ground(grid, span.low, passable, clearance, (clearance >= config.robot_radius_m) | path, tops)
+
+
+def deep_points(points_world: Points, span: FloorSpan, config: TravelConfig) -> Points:
+    """Of all points (P, 3) those (Q, 3) below the floor that show the ground falling away."""
+    z = points_world[:, 2]
+    return points_world[(z > span.low - config.drop_m) & (z < span.low - 2 * config.floor_band_m)]
 
 
 def _count(points: Points, grid: Grid) -> NDArray[np.int64]:
     rows, columns = grid.cells(points)
     flat = np.bincount(rows * grid.shape[1] + columns, minlength=grid.shape[0] * grid.shape[1])
     return flat.reshape(grid.shape)
+
+
+def _tops(points: Points, above_m: Points, grid: Grid) -> U8:
+    tops = np.zeros(grid.shape, np.uint8)
+    levels = np.ceil(above_m / LEVEL_M).astype(np.uint8)
+    order = np.argsort(levels, kind="stable")  # of several values for a cell the last stays: the highest
+    tops[grid.cells(points[order])] = levels[order]
+    return tops
 
 
 def _obstacles(count: NDArray[np.int64], config: TravelConfig) -> Bool:
@@ -124,9 +138,8 @@ def _free(points: Points, cell_m: float, grid: Grid, span: FloorSpan, config: Tr
     return np.asarray(cv2.dilate(image, np.ones((side, side), np.uint8))) > 0
 
 
-def _blind(path: Bool, below: Points, grid: Grid, span: FloorSpan, config: TravelConfig) -> Bool:
+def _blind(path: Bool, deep: Points, grid: Grid, config: TravelConfig) -> Bool:
     """Cells near the path, but for those where the ground falls away: a downward stair shows its treads and sides."""
-    deep = below[(below[:, 2] > span.low - config.drop_m) & (below[:, 2] < span.low - 2 * config.floor_band_m)]
     drop = _grown(_count(deep, grid) > 0, config.close_m / grid.cell_m)
     return _grown(path, config.blind_m / grid.cell_m) & ~drop
 

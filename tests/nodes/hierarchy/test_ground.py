@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.ground import TravelConfig, find_ground
+from placegraph.nodes.hierarchy.ground import TravelConfig, deep_points, find_ground
 from placegraph.nodes.hierarchy.rooms import Grid
 
 GRID = Grid(np.zeros(2), 0.05, (80, 80))  # 4 x 4 m
@@ -21,7 +21,9 @@ FREE = spread((0.5, 3.5), (0.5, 3.5), 0.75, 0.1)
 
 
 def ground(points=FLOOR, free=FREE, path=PATH, below=NOTHING, **settings):
-    return find_ground(points, below, free, 0.1, np.asarray(path, float), GRID, SPAN, TravelConfig(**settings))
+    config = TravelConfig(**settings)
+    deep = deep_points(below, SPAN, config)
+    return find_ground(points, deep, free, 0.1, np.asarray(path, float), GRID, SPAN, config)
 
 
 def at(image, x, y):
