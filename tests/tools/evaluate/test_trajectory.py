@@ -6,8 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from placegraph.nodes.camera import detect
-from placegraph.runtime.messages import Pose
 from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.messages import Pose
 from placegraph.tools.evaluate import absolute_trajectory_error, against_given
 from placegraph.tools.evaluate.trajectory import at_times, read_poses, relative_pose_error, trajectory_scores
 from placegraph.tools.map_folder import write_trajectory
