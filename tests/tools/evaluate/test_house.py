@@ -12,8 +12,6 @@ from placegraph.runtime.messages import Pose
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.tools.evaluate.aligned_map import read_aligned, read_object_clouds
 from placegraph.tools.evaluate.house import HOUSE_WORDS, LEAST_FRAMES, known_of, sight_of
-from placegraph.tools.evaluate.report import number, plain, table
-from placegraph.tools.evaluate.trajectory import level_alignment
 from placegraph.tools.house.build import build
 from placegraph.tools.house.classes import CLASSES
 from placegraph.tools.house.export import HouseOrder, export
@@ -92,20 +90,6 @@ def write_map(source, folder, objects=None):
 @pytest.fixture
 def perfect(source, tmp_path):
     return write_map(source, tmp_path / "map")
-
-
-def test_the_level_alignment_undoes_a_turn_about_z_and_nothing_else() -> None:
-    walk = np.random.default_rng(0).normal(size=(30, 3))
-    found = level_alignment(transform(MAP_FROM_TRUE, walk), walk)
-    assert found == pytest.approx(inverse(MAP_FROM_TRUE), abs=1e-12)
-    tilted = walk @ Rotation.from_euler("x", 0.2).as_matrix().T
-    assert level_alignment(tilted, walk)[2, :3].tolist() == [0, 0, 1]
-    assert np.isfinite(level_alignment(np.zeros((3, 3)), np.ones((3, 3)))).all()  # a camera that stands
-
-
-def test_a_straight_walk_says_where_the_map_is() -> None:
-    line = np.column_stack((np.arange(5.0), np.zeros(5), np.zeros(5)))
-    assert level_alignment(transform(MAP_FROM_TRUE, line), line) == pytest.approx(inverse(MAP_FROM_TRUE), abs=1e-12)
 
 
 def test_boxes_are_made_anew_from_the_clouds(perfect, source) -> None:
@@ -288,38 +272,12 @@ def test_several_maps_are_one_table_with_means(cli, source, tmp_path) -> None:
     assert "room F1" in head and "obj P" not in head and "ATE" not in head
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        ((), "either --source or --against must say"),
-        (("--source", "S", "--against", "A"), "either --source or --against must say"),
-        (("--source", "S", "--source", "S"), "1 maps and 2 --source"),
-        (("MAP", "--source", "S", "--source", "S"), "a map is named twice"),
-        (("--against", "A", "--questions"), "--questions needs a house with its truth as --source"),
-        (("--against", "A", "--progress"), "--progress needs a house"),
-        (("--against", "A", "--write-truth", "F"), "--write-truth needs a house"),
-        (("--source", "S", "--progress", "--per-class"), "--per-class goes with one map"),
-    ],
-)
-def test_options_that_do_not_fit_are_refused(cli, arguments, reason, tmp_path) -> None:
-    done = cli("evaluate", "MAP", *arguments)
-    assert done.code == 2 and reason in done.reason
-
-
 def test_only_a_house_has_quarters_and_a_truth_to_write(cli, perfect, source, tmp_path) -> None:
     for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
         (tmp_path / name).symlink_to(source / name)
     for option in (("--progress",), ("--write-truth", tmp_path / "t.json")):
         done = cli("evaluate", perfect, "--source", tmp_path, *option)
         assert done.code == 2 and f"{option[0]} needs a house with its truth" in done.reason
-
-
-def test_an_undefined_number_is_a_dash_and_null() -> None:
-    assert (number(float("nan")), number(0.12345), number(2, 0)) == ("-", "0.123", "2")
-    assert plain({"a": float("nan"), "b": {"c": 0.123456}, "d": 3, "e": True}) == {
-        "a": None, "b": {"c": 0.1235}, "d": 3, "e": True,
-    }  # fmt: skip
-    assert table([("a", "bb"), ("ccc", "d")]) == "a    bb\nccc   d"
 
 
 def test_a_house_of_which_nothing_was_seen_can_be_told(cli, perfect, source, tmp_path) -> None:

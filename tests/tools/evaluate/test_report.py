@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from placegraph.tools.evaluate.report import COLUMNS, map_text, maps_text, means
+from placegraph.tools.evaluate.report import COLUMNS, map_text, maps_text, means, number, plain, table
 
 NAN = float("nan")
 
@@ -29,3 +29,11 @@ def test_a_trajectory_alone_says_nothing_of_layers() -> None:
     assert text == (
         "ATE rmse 0.1 m, max 0.2 m, over 9 poses and 5.0 m of path: 2.00 % of it; RPE over 1 m of path - m, - degrees"
     )
+
+
+def test_an_undefined_number_is_a_dash_and_null() -> None:
+    assert (number(float("nan")), number(0.12345), number(2, 0)) == ("-", "0.123", "2")
+    assert plain({"a": float("nan"), "b": {"c": 0.123456}, "d": 3, "e": True}) == {
+        "a": None, "b": {"c": 0.1235}, "d": 3, "e": True,
+    }  # fmt: skip
+    assert table([("a", "bb"), ("ccc", "d")]) == "a    bb\nccc   d"

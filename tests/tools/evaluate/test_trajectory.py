@@ -7,11 +7,21 @@ from scipy.spatial.transform import Rotation
 
 from placegraph.nodes.camera import detect
 from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.geometry import inverse, transform
 from placegraph.runtime.messages import Pose
 from placegraph.tools.evaluate import absolute_trajectory_error, against_given
-from placegraph.tools.evaluate.trajectory import at_times, read_poses, relative_pose_error, trajectory_scores
+from placegraph.tools.evaluate.trajectory import (
+    at_times,
+    level_alignment,
+    read_poses,
+    relative_pose_error,
+    trajectory_scores,
+)
 from placegraph.tools.map_folder import write_trajectory
 
+MOTION = np.eye(4)
+MOTION[:3, :3] = Rotation.from_euler("z", 0.7).as_matrix()
+MOTION[:3, 3] = (4, -5, 0.6)
 SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
 
 
@@ -133,6 +143,20 @@ def test_poses_of_a_file_are_checked(tmp_path) -> None:
     file.write_text("1.5 1 2 3 0 0 0 0\n")
     with pytest.raises(SchemaError, match=r"the pose at 1\.5 has the quaternion 0 0 0 0"):
         read_poses(file)
+
+
+def test_the_level_alignment_undoes_a_turn_about_z_and_nothing_else() -> None:
+    walk = np.random.default_rng(0).normal(size=(30, 3))
+    found = level_alignment(transform(MOTION, walk), walk)
+    assert found == pytest.approx(inverse(MOTION), abs=1e-12)
+    tilted = walk @ Rotation.from_euler("x", 0.2).as_matrix().T
+    assert level_alignment(tilted, walk)[2, :3].tolist() == [0, 0, 1]
+    assert np.isfinite(level_alignment(np.zeros((3, 3)), np.ones((3, 3)))).all()  # a camera that stands
+
+
+def test_a_straight_walk_says_where_the_map_is() -> None:
+    line = np.column_stack((np.arange(5.0), np.zeros(5), np.zeros(5)))
+    assert level_alignment(transform(MOTION, line), line) == pytest.approx(inverse(MOTION), abs=1e-12)
 
 
 @pytest.fixture
