@@ -34,6 +34,7 @@ def source_scores(folder: Path, source: Path, questions: bool = False) -> dict[s
     found = trajectory_scores(read_poses(folder / TRAJECTORY), given)
     if found is None:
         raise SourceError(f"{source}: fewer than 3 given poses at the times of {folder / TRAJECTORY}")
+    found["poses_given"] = len(given or {})
     return found | house_scores(folder, source, given, questions) if has_truth(source) else found
 
 

@@ -24,6 +24,7 @@ F64 = NDArray[np.float64]
 
 LEAST_FRAMES = 5  # seen well: clear in so many frames
 LEAST_SHARE = 0.5  # of a location's members must have been seen well
+LEAST_HEIGHT_M = 1.0  # of a camera over the floor it is on: on the stairs it rises above a storey before the feet do
 HOUSE_WORDS = Words({one.name: (*one.said[1:], *one.unsaid) for one in CLASSES})
 
 
@@ -89,7 +90,7 @@ def _entered_room(room: TrueRoom, truth: Truth, positions: F64) -> bool:
 def _entered(outline: F64, floor_index: int, truth: Truth, positions: F64) -> bool:
     floor = truth.floors[floor_index]
     height = positions[:, 2] - floor.z_m
-    here = positions[(height > 0) & (height < floor.height_m)]
+    here = positions[(height > LEAST_HEIGHT_M) & (height < floor.height_m)]
     return bool(inside(outline, here[:, :2]).any())
 
 

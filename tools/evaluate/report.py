@@ -97,7 +97,10 @@ def map_text(scores: Mapping[str, Any], per_class: bool) -> str:
 
 
 def _trajectory(scores: Mapping[str, Any]) -> str:
-    words = "ATE rmse {ate_rmse_m} m, max {ate_max_m} m, over {poses} poses and {path_m} m of path".format(**scores)
+    of = f" of {scores['poses_given']}" if "poses_given" in scores else ""  # what is not trusted is not in the map's
+    words = "ATE rmse {ate_rmse_m} m, max {ate_max_m} m, over {poses}{of} poses and {path_m} m of path".format(
+        **scores, of=of
+    )
     return (
         f"{words}: {number(100 * scores['ate_share'], 2)} % of it; RPE over 1 m of path "
         f"{number(scores['rpe_m'])} m, {number(scores['rpe_deg'], 2)} degrees"

@@ -191,7 +191,7 @@ def test_without_truth_the_house_options_are_refused(cli, perfect, source, tmp_p
     for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
         (bare / name).symlink_to(source / name)
     assert set(json.loads(cli("evaluate", perfect, "--source", bare, "--json").out)) == {
-        "ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg",
+        "ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg", "poses_given",
     }  # fmt: skip
     assert cli("evaluate", perfect, "--source", bare).out.startswith("ATE rmse 0.0 m")
     refused = cli("evaluate", perfect, "--source", bare, "--questions")
@@ -222,6 +222,8 @@ def test_what_the_walk_did_not_show_is_not_asked_for(source) -> None:
     assert {one.seen for one in known.objects} == {"well", "poorly"}
     inside = np.array([[*truth.rooms[0].polygon.mean(axis=0), truth.floors[0].z_m + 1.5]])
     assert known_of(truth, seen, inside).floors[0].seen and known_of(truth, seen, inside).rooms[0].seen
+    climbing = inside - (0, 0, 0.8)  # the camera is above the storey's surface, whoever carries it is not
+    assert not known_of(truth, seen, climbing).floors[0].seen
 
 
 def test_the_truth_of_a_house_as_a_file_gives_the_same_scores(cli, perfect, source, tmp_path) -> None:
@@ -230,6 +232,7 @@ def test_the_truth_of_a_house_as_a_file_gives_the_same_scores(cli, perfect, sour
     done = cli("evaluate", perfect, "--against", file, "--json")
     assert done.code == 0, done.err
     by_file = json.loads(done.out)
+    assert by_source.pop("poses_given") == 4
     assert by_file.keys() == by_source.keys() == {
         "floors", "rooms", "locations", "objects",
         "ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg",

@@ -196,7 +196,7 @@ def test_the_command_on_a_moved_copy(cli, track, seven) -> None:
     done = cli("evaluate", track(), "--source", seven, "--json")
     assert done.code == 0 and done.err == ""
     found = json.loads(done.out)
-    assert set(found) == {"ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg"}
+    assert set(found) == {"ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg", "poses_given"}
     assert (found["ate_rmse_m"], found["ate_max_m"], found["poses"]) == (0.0, 0.0, 4) and found["path_m"] > 1
 
 
