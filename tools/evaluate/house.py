@@ -37,7 +37,8 @@ def house_scores(folder: Path, source: Path, given: Mapping[int, F64] | None, qu
     estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
     true_from_map = level_alignment(estimated, true)
     aligned = read_aligned(folder, true_from_map)
-    found = map_scores(aligned, known_of(truth, truth.seen, true))
+    known = known_of(truth, truth.seen, true)
+    found = map_scores(aligned, known)
     if questions:
         asked = read_questions(source)
         if not asked:
