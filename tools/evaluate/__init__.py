@@ -1,52 +1,95 @@
-"""Measure a map against what is known of its source: poses, and of a procedural house everything."""
+"""Measure maps against what is known of their sources: poses, and of a house or by a truth file all layers."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.errors import ConfigError
 from placegraph.tools.evaluate.trajectory import absolute_trajectory_error, against_given
 
 __all__ = ["absolute_trajectory_error", "against_given", "evaluate"]
 
 
 def evaluate(
-    map_folder: Annotated[Path, typer.Argument(metavar="MAP", help="A map folder that `placegraph run` wrote.")],
-    source: Annotated[Path, typer.Option(help="The data set with the given poses; with a truth/, all else is scored.")],
+    maps: Annotated[list[Path], typer.Argument(metavar="MAP...", help="Map folders that `placegraph run` wrote.")],
+    source: Annotated[
+        list[Path] | None, typer.Option(help="The data set with the given poses; with a truth/, all else is scored.")
+    ] = None,
+    against: Annotated[list[Path] | None, typer.Option(help="A truth file (JSON) instead of a data set.")] = None,
+    progress: Annotated[bool, typer.Option("--progress", help="Score the map after each quarter of the walk.")] = False,
     questions: Annotated[bool, typer.Option("--questions", help="Ask the map the house's questions, too.")] = False,
     per_class: Annotated[bool, typer.Option("--per-class", help="Print the objects by class.")] = False,
+    write_truth: Annotated[Path | None, typer.Option(help="Write the house's truth as a truth file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Compare a map with its data set: ATE rmse in metres, and with a house's truth its floors, rooms and objects.
+    """Compare a map with its data set: trajectory, and where the truth tells floors, rooms, locations and objects.
 
-    For the truth the map is turned about z and shifted as fits the trajectories best; it is not levelled anew.
+    Several maps, each with its own --source or --against in the same order, give a table with the means. For the truth
+    a map is turned about z and shifted as fits the trajectories best; it is not levelled anew.
     """
-    from placegraph.nodes.camera import detect
-    from placegraph.tools.house.truth import TRUTH
-    from placegraph.tools.map_folder import TRAJECTORY, read_trajectory
+    from placegraph.tools.evaluate.cases import file_scores, quarter_scores, source_scores, write_house_truth
+    from placegraph.tools.evaluate.report import map_text, plain
 
-    given = detect(str(source))(source, {}).given_poses()
-    found = against_given(read_trajectory(map_folder / TRAJECTORY), given)
-    if found is None:
-        raise SourceError(f"{source}: fewer than 3 given poses at the times of {map_folder / TRAJECTORY}")
-    if not (source / TRUTH).is_dir():
-        if questions or per_class:
-            raise ConfigError(f"{source}: no {TRUTH}/ here; --questions and --per-class need a house with its truth")
-        print(json.dumps(found, sort_keys=True) if as_json else _ate(found))
+    truths = _truths(maps, source or [], against or [])
+    _check(maps, source or [], progress, questions, per_class, write_truth)
+    if write_truth is not None:
+        write_house_truth(truths[0], write_truth)
+    if progress:
+        by_part = [quarter_scores(*one) for one in zip(maps, truths, strict=True)]
+        _print_table({part: dict(zip(maps, [q[part] for q in by_part], strict=True)) for part in by_part[0]}, as_json)
         return
-    from placegraph.tools.evaluate.house import house_scores
-    from placegraph.tools.evaluate.report import house_text, plain
-
-    scores = house_scores(map_folder, source, given, questions)
-    if as_json:
-        print(json.dumps(found | plain(scores), sort_keys=True))
+    score = file_scores if against else lambda folder, path: source_scores(folder, path, questions)
+    found = [score(*one) for one in zip(maps, truths, strict=True)]
+    if len(found) > 1:
+        _print_table({"": dict(zip(maps, found, strict=True))}, as_json)
     else:
-        print(f"{_ate(found)}\n{house_text(scores, per_class)}")
+        print(json.dumps(plain(found[0]), sort_keys=True) if as_json else map_text(found[0], per_class))
 
 
-def _ate(found: dict[str, float]) -> str:
-    return "ATE rmse {ate_rmse_m} m, max {ate_max_m} m, over {poses} poses and {path_m} m of path".format(**found)
+def _truths(maps: list[Path], source: list[Path], against: list[Path]) -> list[Path]:
+    if bool(source) == bool(against):
+        raise ConfigError("either --source or --against must say what the map is compared with")
+    option, given = ("--source", source) if source else ("--against", against)
+    if len(given) != len(maps):
+        raise ConfigError(f"{len(maps)} maps and {len(given)} {option}: one for each map is needed, in the same order")
+    if len(set(maps)) != len(maps):
+        raise ConfigError("a map is named twice")
+    return given
+
+
+def _check(
+    maps: list[Path], source: list[Path], progress: bool, questions: bool, per_class: bool, write_truth: Path | None
+) -> None:
+    """What only one house, or only a house, can be asked for."""
+    from placegraph.tools.evaluate.cases import has_truth
+
+    for asked, option in ((questions, "--questions"), (per_class, "--per-class"), (write_truth, "--write-truth")):
+        if asked and (len(maps) > 1 or progress):
+            raise ConfigError(f"{option} goes with one map and without --progress")
+    if questions or write_truth or progress:
+        wanted = "--questions" if questions else "--write-truth" if write_truth else "--progress"
+        if not source:
+            raise ConfigError(f"{wanted} needs a house with its truth as --source")
+    if source and (questions or per_class) and not has_truth(source[0]):
+        raise ConfigError(f"{source[0]}: no truth/ here; --questions and --per-class need a house with its truth")
+
+
+def _print_table(groups: dict[str, dict[Path, dict[str, Any]]], as_json: bool) -> None:
+    """Scores by map in groups, one for each part of the walk, with the means of each group."""
+    from placegraph.tools.evaluate.report import maps_text, means, plain
+
+    averages = {group: means(list(rows.values())) for group, rows in groups.items()}
+    if as_json:
+        values = {
+            group: {"maps": {str(folder): row for folder, row in rows.items()}, "mean": averages[group]}
+            for group, rows in groups.items()
+        }
+        print(json.dumps(plain(values.get("", values)), sort_keys=True))
+        return
+    several = any(len(rows) > 1 for rows in groups.values())
+    table = {f"{folder} {group}".strip(): row for group, rows in groups.items() for folder, row in rows.items()}
+    print(maps_text(table, {f"mean {group}".strip(): mean for group, mean in averages.items()} if several else {}))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.tools.map_folder import OBJECTS, find_graph, read_object_clouds
 
 F64 = NDArray[np.float64]
+Points = NDArray[np.floating]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,9 @@ class AlignedMap:
     objects: tuple[MapObject, ...]
 
 
+NOTHING = AlignedMap(np.zeros((0, 2)), (), (), ())
+
+
 def read_aligned(folder: Path, true_from_map: F64) -> AlignedMap:
     """Read a map folder's graph and object clouds and move them by a turn about z and a shift (4, 4).
 
@@ -51,12 +56,20 @@ def read_aligned(folder: Path, true_from_map: F64) -> AlignedMap:
     """
     graph = SceneGraph.load(find_graph(folder))
     clouds = read_object_clouds(folder)
+    return aligned(graph, clouds, true_from_map, str(folder / OBJECTS))
+
+
+def aligned(graph: SceneGraph, clouds: Mapping[str, Points], true_from_map: F64, where: str) -> AlignedMap:
+    """A graph and the points (N, 3) of its objects by id, moved by a turn about z and a shift (4, 4).
+
+    Raises SchemaError, saying `where` the points are from, when those of an object are missing.
+    """
     floors = graph.layer("floor")
     number = {floor.id: i for i, floor in enumerate(floors)}
     objects = []
     for node in graph.layer("object"):
-        if node.id not in clouds:
-            raise SchemaError(f"{folder / OBJECTS}: no points of {node.id}, which the graph holds; of another run?")
+        if node.id not in clouds or not len(clouds[node.id]):
+            raise SchemaError(f"{where}: no points of {node.id}, which the graph holds; of another run?")
         box = bounding_box(transform(true_from_map, clouds[node.id].astype(np.float64)))
         objects.append(MapObject(node.id, node.tags, box.astype(np.float64)))
 

@@ -1,10 +1,10 @@
 """Objects of a map against the true ones.
 
-A map object *fits* a true object when its strongest tag is a word of the true class (classes.py: said or unsaid,
-plurals alike) and either their axis-aligned boxes overlap by an IoU of at least .25, or the true object is thin (an
-extent below .12 m: a picture, a rug, a curtain) and the boxes' centres are less than .25 m apart. Map objects are
-paired with the true objects that were seen well, one to one, the largest IoU first, then the nearest centres. A map
-object *lies on* a true object when it fits, or is of its class and has at least half of its volume inside its box.
+A map object *fits* a true object when its strongest tag means the true class (known.Words) and either their axis-
+aligned boxes overlap by an IoU of at least .25, or the true object is thin (an extent below .12 m: a picture, a rug, a
+curtain) and the boxes' centres are less than .25 m apart. Map objects are paired with the true objects that were seen
+well, one to one, the largest IoU first, then the nearest centres. A map object *lies on* a true object when it fits,
+or is of its class and has at least half of its volume inside its box.
 
 Right: paired. Set aside, neither right nor wrong: not paired, and lies on an object that was seen, but not well.
 Wrong: the rest, duplicates among them.
@@ -19,23 +19,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.models_onnx.text import TextEncoder
-from placegraph.nodes.grounding.words import normal_form
+from placegraph.runtime.scene_graph import Tag
 from placegraph.tools.evaluate.aligned_map import MapObject
+from placegraph.tools.evaluate.known import KnownObject, Words
 from placegraph.tools.evaluate.places import share
-from placegraph.tools.house.classes import CLASSES, NAMES
-from placegraph.tools.house.truth import Seen, TrueObject
 
 F64 = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-LEAST_FRAMES = 5  # seen well: clear in so many frames
 LEAST_IOU = 0.25
 STRICT_IOU = 0.5
 THIN_M = 0.12
 NEAR_M = 0.25
 INSIDE = 0.5
 TOP_K = (1, 3, 5, 10)
+ALIKE = 1e-6  # of likenesses: not told apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,30 +46,19 @@ class Pairing:
     named: Bools
 
 
-def class_of_word() -> dict[str, str]:
-    """The class's name of each word, by the word's normal form."""
-    return {normal_form(word): one.name for one in CLASSES for word in (*one.said, *one.unsaid)}
-
-
-def seen_well(seen: Seen) -> bool:
-    """Whether the walk showed an object well enough to ask for it."""
-    return seen.clear_frames >= LEAST_FRAMES
-
-
-def object_scores(found: Sequence[MapObject], true: Sequence[TrueObject], seen: Sequence[Seen]) -> dict[str, Any]:
-    """All numbers of the objects; `seen` has an entry for each true object."""
-    well = np.array([seen_well(one) for one in seen], bool)
-    boxes = np.array([one.box for one in true]).reshape(-1, 2, 3)
-    pairing = compare(found, true)
-    fit = fits(pairing, boxes)
+def object_scores(found: Sequence[MapObject], true: Sequence[KnownObject], words: Words) -> dict[str, Any]:
+    """All numbers of the objects. Source of duplicates and AUC top-k: METHOD.md, section 11."""
+    well, poor = (np.array([one.seen == sight for one in true], bool) for sight in ("well", "poorly"))
+    called = words.called([one.tags[0].name if one.tags else "" for one in found])
+    pairing = compare(found, true, called)
+    fit = fits(pairing, np.array([one.box for one in true]).reshape(-1, 2, 3))
     right = pair(pairing, fit & well)
     strict = pair(pairing, pairing.named & (pairing.iou >= STRICT_IOU) & well)
     anyhow = pair(pairing, (pairing.iou >= LEAST_IOU) & well)
     on = fit | (pairing.named & (pairing.inside >= INSIDE))
-    poor = np.array([one.frames > 0 for one in seen], bool) & ~well
     aside = {i for i in range(len(found)) if i not in right and on[i, poor].any()}
-    got = sorted(right.values())
-    truth, judged = int(well.sum()), len(found) - len(aside)
+    got, truth = sorted(right.values()), int(well.sum())
+    tags = [(found[i].tags, true[j].name) for i, j in sorted(anyhow.items())]
     return {
         "truth": truth,
         "of": len(true),
@@ -79,27 +66,31 @@ def object_scores(found: Sequence[MapObject], true: Sequence[TrueObject], seen: 
         "aside": len(aside),
         "found": len(got),
         "recall": share(len(got), truth),
-        "precision": share(len(right), judged),
+        "precision": share(len(right), len(found) - len(aside)),
         "recall_50": share(len(strict), truth),
         "recall_any_name": share(len(anyhow), truth),
         "mean_iou": share(float(sum(pairing.iou[i, j] for i, j in right.items())), len(right)),
-        "map_per_found": share(int(on[:, got].any(axis=1).sum()) if got else 0, len(got)),
-        "top_k": top_k([(found[i].tags, true[j].class_name) for i, j in sorted(anyhow.items())]),
-        "classes": _by_class(found, true, well, right, aside),
+        "map_per_found": _each(on, got),
+        "map_per_found_any_name": _each(pairing.iou >= LEAST_IOU, sorted(anyhow.values())),
+        "top_k": top_k(tags, words),
+        "classes": _by_class(found, true, called, right, aside),
     }
 
 
-def compare(found: Sequence[MapObject], true: Sequence[TrueObject]) -> Pairing:
-    """Compare each map object with each true one."""
+def _each(on: Bools, got: Sequence[int]) -> float:
+    """Map objects on true ones that were found, for each of those: 1 where none is there twice."""
+    return share(int(on[:, list(got)].any(axis=1).sum()) if got else 0, len(got))
+
+
+def compare(found: Sequence[MapObject], true: Sequence[KnownObject], called: Sequence[str]) -> Pairing:
+    """Compare each map object, and the class that it is called, with each true one."""
     a = np.array([one.box for one in found]).reshape(-1, 1, 2, 3)
     b = np.array([one.box for one in true]).reshape(1, -1, 2, 3)
     edges = np.minimum(a[..., 1, :], b[..., 1, :]) - np.maximum(a[..., 0, :], b[..., 0, :])
     shared = np.prod(np.maximum(edges, 0), axis=2)
     of_a, of_b = (np.prod(one[..., 1, :] - one[..., 0, :], axis=2) for one in (a, b))
     union = of_a + of_b - shared
-    names = class_of_word()
-    called = [names.get(normal_form(one.tags[0].name), "") if one.tags else "" for one in found]
-    named = [[name == other.class_name for other in true] for name in called]
+    named = [[name == other.name for other in true] for name in called]
     return Pairing(
         iou=np.divide(shared, union, out=np.zeros_like(shared), where=union > 0),
         apart_m=np.linalg.norm(a.mean(axis=2) - b.mean(axis=2), axis=2),
@@ -127,42 +118,45 @@ def pair(pairing: Pairing, allowed: Bools) -> dict[int, int]:
     return taken
 
 
-def top_k(pairs: Sequence[tuple[tuple[Any, ...], str]]) -> dict[str, Any]:
+def top_k(pairs: Sequence[tuple[Sequence[Tag], str]], words: Words) -> dict[str, Any]:
     """How soon the true class comes among all classes, ranked by likeness to the object's tags.
 
     The likeness of a class is the mean cosine of its name with the tags, by their weights; `auc` is the area under the
-    curve of top-k accuracy, k over the number of classes. Source: paper, AUC top-k (from HOV-SG).
+    curve of top-k accuracy, k over the number of classes. Classes that are equally like come in every order alike, so
+    that an object without tags gets no credit. Source: paper, AUC top-k (from HOV-SG).
     """
+    count = len(words.names)
     if not pairs:
-        return {"objects": 0, "classes": len(NAMES)}
-    encoder = TextEncoder()
-    names = encoder.encode(NAMES)
-    ranks = []
+        return {"objects": 0, "classes": count}
+    curves = []
     for tags, true_class in pairs:
-        weights = np.array([tag.weight for tag in tags])
-        likeness = names @ (encoder.encode([tag.name for tag in tags]).T @ weights)
-        ranks.append(int((likeness > likeness[NAMES.index(true_class)] + 1e-6).sum()))
-    accuracy = np.array([np.mean(np.array(ranks) < k) for k in range(1, len(NAMES) + 1)])
-    curve = {f"top_{k}": float(accuracy[k - 1]) for k in TOP_K}
-    return {"objects": len(ranks), "classes": len(NAMES), "auc": float(accuracy.mean())} | curve
+        likeness = np.array([tag.weight for tag in tags]) @ words.likeness([tag.name for tag in tags])
+        ahead = likeness - likeness[words.names.index(true_class)]
+        before, equal = (ahead > ALIKE).sum(), (np.abs(ahead) <= ALIKE).sum()
+        curves.append(np.clip((np.arange(1, count + 1) - before) / equal, 0, 1))
+    accuracy = np.mean(curves, axis=0)
+    curve = {f"top_{k}": float(accuracy[min(k, count) - 1]) for k in TOP_K}
+    return {"objects": len(pairs), "classes": count, "auc": float(accuracy.mean())} | curve
 
 
 def _by_class(
-    found: Sequence[MapObject], true: Sequence[TrueObject], well: Bools, right: dict[int, int], aside: set[int]
+    found: Sequence[MapObject],
+    true: Sequence[KnownObject],
+    called: Sequence[str],
+    right: dict[int, int],
+    aside: set[int],
 ) -> dict[str, dict[str, int]]:
     """Counts by class: true ones seen well, found, map objects so called, and those of them that are wrong."""
-    words = class_of_word()
     table: dict[str, dict[str, int]] = {}
 
     def row(name: str) -> dict[str, int]:
         return table.setdefault(name, {"truth": 0, "found": 0, "map": 0, "wrong": 0})
 
-    for one, counts in zip(true, well.tolist(), strict=True):
-        if counts:
-            row(one.class_name)["truth"] += 1
+    for one in true:
+        if one.seen == "well":
+            row(one.name)["truth"] += 1
     for i, thing in enumerate(found):
-        called = thing.tags[0].name if thing.tags else "(no name)"
-        mine = row(words.get(normal_form(called), called))
+        mine = row(called[i] or (thing.tags[0].name if thing.tags else "(no name)"))
         mine["map"] += 1
         mine["found"] += i in right
         mine["wrong"] += i not in right and i not in aside

@@ -20,8 +20,8 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.node import plugin
 from placegraph.tools.evaluate import detection, tags
 from placegraph.tools.evaluate.detection import FoundBoxes, TrueBoxes, mean_of_known
+from placegraph.tools.evaluate.house import HOUSE_WORDS
 from placegraph.tools.evaluate.masks import mask_overlaps
-from placegraph.tools.evaluate.objects import class_of_word
 from placegraph.tools.evaluate.views import evaluation_views
 from placegraph.tools.house.classes import CLASSES, NAMES
 from placegraph.tools.train.samples import Shard
@@ -32,7 +32,7 @@ FAMILIES = "placegraph.models_onnx"
 LEAST_SCORE = 0.01  # in place of a run's own floor: average precision is about the order of all finds
 UNSAID = tuple(one.unsaid[0] if one.unsaid else one.name for one in CLASSES)  # a class without a synonym by its name
 HAS_UNSAID = np.array([bool(one.unsaid) for one in CLASSES])
-CLASS_OF_WORD = {word: NAMES.index(name) for word, name in class_of_word().items()}
+CLASS_OF_WORD = {word: NAMES.index(name) for word, name in HOUSE_WORDS.class_of_word.items()}
 
 
 @dataclass(frozen=True)

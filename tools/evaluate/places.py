@@ -16,6 +16,7 @@ CELL_M = 0.05
 BOUNDARY_M = 0.5  # METHOD.md, section 11
 DELTAS = tuple(round(0.1 * k, 1) for k in range(1, 10))
 
+Cells = tuple[NDArray[np.int64], NDArray[np.bool_]]
 Area = tuple[int, F64]  # floor and outline (N, 2) in metres; areas of different floors never overlap
 
 
@@ -50,32 +51,34 @@ def share(part: float, whole: float) -> float:
 
 def overlaps(found: Sequence[Area], true: Sequence[Area], cell_m: float = CELL_M) -> Overlaps:
     """Overlaps of areas, by the cells of a common grid whose middle lies in them."""
-    areas = [*found, *true]
-    outlines = [outline for _, outline in areas if len(outline)]
-    if not outlines:
-        return Overlaps(np.zeros((len(found), len(true))), np.zeros(len(found)), np.zeros(len(true)))
-    corners = np.concatenate(outlines)
-    low = np.floor(corners.min(axis=0) / cell_m)
-    columns, rows = (np.ceil(corners.max(axis=0) / cell_m) - low).astype(int).tolist()
-    grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
-    middles = (grid + low + 0.5) * cell_m
-    masks = np.array([_mask(outline, middles) for _, outline in areas], np.float32)
-    a, b = masks[: len(found)], masks[len(found) :]
-    floors = [floor for floor, _ in areas]
-    same = np.equal.outer(floors[: len(found)], floors[len(found) :]).reshape(len(found), len(true))
-    # sums of ones in float32 are exact up to 2^24 cells, 40 000 square metres
-    return Overlaps((a @ b.T).astype(np.float64) * same, a.sum(axis=1, dtype=float), b.sum(axis=1, dtype=float))
+    a, b = ([_cells(outline, cell_m) for _, outline in areas] for areas in (found, true))
+    shared = np.zeros((len(found), len(true)))
+    for i, j in np.ndindex(*shared.shape):
+        if found[i][0] == true[j][0]:
+            shared[i, j] = _shared(a[i], b[j])
+    covers = (np.array([mask.sum() for _, mask in cells], float) for cells in (a, b))
+    return Overlaps(shared, *covers)
 
 
-def _mask(outline: F64, middles: F64) -> NDArray[np.bool_]:
-    """(cells,) which cells of a grid (R, C, 2) lie in an outline; only those within its extent are asked."""
-    found = np.zeros(middles.shape[:2], bool)
-    if len(outline) >= 3:
-        x, y = middles[0, :, 0], middles[:, 0, 1]
-        columns = slice(*np.searchsorted(x, (outline[:, 0].min(), outline[:, 0].max())).tolist())
-        rows = slice(*np.searchsorted(y, (outline[:, 1].min(), outline[:, 1].max())).tolist())
-        found[rows, columns] = inside(outline, middles[rows, columns])
-    return found.ravel()
+def _cells(outline: F64, cell_m: float) -> Cells:
+    """Number (2,) of the first cell along x and y of an outline's extent, and which cells of it lie inside."""
+    if len(outline) < 3:
+        return np.zeros(2, np.int64), np.zeros((0, 0), bool)
+    low = np.floor(outline.min(axis=0) / cell_m).astype(np.int64)
+    count = np.ceil(outline.max(axis=0) / cell_m).astype(np.int64) - low
+    grid = np.stack(np.meshgrid(np.arange(count[0]), np.arange(count[1]), indexing="ij"), axis=-1)
+    return low, inside(outline, (grid + low + 0.5) * cell_m)
+
+
+def _shared(a: Cells, b: Cells) -> int:
+    low = np.maximum(a[0], b[0])
+    high = np.minimum(a[0] + a[1].shape, b[0] + b[1].shape)
+    if (low >= high).any():
+        return 0
+    parts = (
+        mask[tuple(slice(*ends) for ends in zip(low - first, high - first, strict=True))] for first, mask in (a, b)
+    )
+    return int(np.logical_and(*parts).sum())
 
 
 def hydra(overlaps: Overlaps) -> tuple[float, float]:
@@ -111,13 +114,14 @@ def f1_curve(iou: F64, deltas: Sequence[float] = DELTAS) -> dict[float, float]:
 def match_floors(found: F64, true: F64) -> list[tuple[int, int, float]]:
     """Pairs (found, true, error) of floors given by their lowest and highest height (F, 2), (T, 2) in metres.
 
-    Floors whose surfaces are nearest come first, each floor once: two floors taken for one are the lower of them. The
-    error is that of the worse boundary.
+    Floors whose surfaces are nearest come first, each floor once: two floors taken for one are the lower of them. Two
+    that have no height in common are no pair, however few there are. The error is that of the worse boundary.
     """
     error = np.abs(found[:, None] - true[None])
-    free = error[..., 0].copy()
+    apart = np.maximum(found[:, None, 0], true[None, :, 0]) > np.minimum(found[:, None, 1], true[None, :, 1])
+    free = np.where(apart, np.inf, error[..., 0])
     pairs = []
-    for _ in range(min(free.shape)):
+    while np.isfinite(free).any():
         i, j = (int(k) for k in np.unravel_index(free.argmin(), free.shape))
         pairs.append((i, j, float(error[i, j].max())))
         free[i], free[:, j] = np.inf, np.inf

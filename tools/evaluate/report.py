@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
+
+from placegraph.tools.evaluate.detection import mean_of_known
+from placegraph.tools.evaluate.places import BOUNDARY_M
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -30,38 +35,122 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-def house_text(scores: dict[str, Any], per_class: bool) -> str:
-    """Scores of a house, as house.house_scores gives them, in words."""
-    floors, rooms, places, things = (scores[name] for name in ("floors", "rooms", "locations", "objects"))
-    curve = " ".join(f"{delta}:{number(f1, 2)}" for delta, f1 in places["f1_at"].items())
-    lines = [
-        f"floors     {floors['truth']} true, {floors['map']} in the map, {floors['right']} with both boundaries within "
-        f"0.5 m (mean error {number(floors['boundary_error_m'], 2)} m)",
-        f"rooms      {rooms['truth']} of {rooms['of']} seen, {rooms['map']} in the map: F1 {number(rooms['f1'])}, "
-        f"precision {number(rooms['precision'])}, recall {number(rooms['recall'])} at IoU 0.5; Hydra precision "
-        f"{number(rooms['hydra_precision'])}, recall {number(rooms['hydra_recall'])}",
-        f"locations  {places['truth']} of {places['of']} seen, {places['map']} in the map: F1 by IoU {curve}",
-        f"objects    {things['truth']} of {things['of']} seen well, {things['map']} in the map ({things['aside']} set "
-        f"aside): recall {number(things['recall'])}, precision {number(things['precision'])}, mean IoU "
-        f"{number(things['mean_iou'])}, {number(things['map_per_found'], 2)} map objects for each found one; recall at "
-        f"IoU 0.5 {number(things['recall_50'])}, whatever the name {number(things['recall_any_name'])}",
+COLUMNS = (  # of a table of maps: head, where the number stands, its factor, digits
+    ("ATE m", ("ate_rmse_m",), 1, 3),
+    ("ATE %", ("ate_share",), 100, 2),
+    ("path m", ("path_m",), 1, 1),
+    ("floor P", ("floors", "precision"), 1, 2),
+    ("floor R", ("floors", "recall"), 1, 2),
+    ("room P", ("rooms", "precision"), 1, 2),
+    ("room R", ("rooms", "recall"), 1, 2),
+    ("room F1", ("rooms", "f1"), 1, 3),
+    ("Hydra P", ("rooms", "hydra_precision"), 1, 2),
+    ("Hydra R", ("rooms", "hydra_recall"), 1, 2),
+    ("loc F1@.5", ("locations", "f1_at", "0.5"), 1, 3),
+    ("obj P", ("objects", "precision"), 1, 3),
+    ("obj R", ("objects", "recall"), 1, 3),
+    ("obj IoU", ("objects", "mean_iou"), 1, 3),
+    ("per found", ("objects", "map_per_found"), 1, 2),
+    ("AUC", ("objects", "top_k", "auc"), 1, 3),
+)
+
+
+def means(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """The mean of each column over the maps that have it, by the column's head; NaN where none has."""
+    return {
+        head: mean_of_known(np.array([_at(row, keys) * factor for row in rows])) for head, keys, factor, _ in COLUMNS
+    }
+
+
+def maps_text(rows: Mapping[str, Mapping[str, Any]], averages: Mapping[str, Mapping[str, float]]) -> str:
+    """A table of scores by label, then of means by label; columns that nobody has are left out."""
+    shown = [column for column in COLUMNS if any(not math.isnan(_at(row, column[1])) for row in rows.values())]
+    lines = [("map", *(head for head, *_ in shown))]
+    for label, row in rows.items():
+        lines.append((label, *(number(_at(row, keys) * factor, digits) for _, keys, factor, digits in shown)))
+    for label, mean in averages.items():
+        lines.append((label, *(number(mean[head], digits) for head, _, _, digits in shown)))
+    return table(lines)
+
+
+def _at(scores: Any, keys: Sequence[str]) -> float:
+    for key in keys:
+        scores = scores.get(key) if isinstance(scores, Mapping) else None
+    return float("nan") if scores is None else float(scores)
+
+
+def map_text(scores: Mapping[str, Any], per_class: bool) -> str:
+    """Scores of one map in words: a line for each layer, and what the truth does not tell."""
+    lines = [_trajectory(scores)] if "ate_rmse_m" in scores else []
+    parts = {"floors": _floors, "rooms": _rooms, "locations": _locations, "objects": _objects}
+    lines += [line for layer, words in parts.items() if layer in scores for line in words(scores[layer])]
+    absent = [layer for layer in parts if layer not in scores]
+    if len(absent) < len(parts):
+        lines += [f"{layer:<10} not in the truth: not scored" for layer in absent]
+        if "ate_rmse_m" not in scores:
+            lines.append("trajectory not in the truth: not scored; both frames are taken as equal")
+    if "connections" in scores:
+        lines += _connections(scores["connections"])
+    if per_class and "objects" in scores:
+        lines += ["", _classes(scores["objects"]["classes"])]
+    if "questions" in scores:
+        lines += ["", _questions(scores["questions"])]
+    return "\n".join(lines)
+
+
+def _trajectory(scores: Mapping[str, Any]) -> str:
+    of = f" of {scores['poses_given']}" if "poses_given" in scores else ""  # what is not trusted is not in the map's
+    words = "ATE rmse {ate_rmse_m} m, max {ate_max_m} m, over {poses}{of} poses and {path_m} m of path".format(
+        **scores, of=of
+    )
+    return (
+        f"{words}: {number(100 * scores['ate_share'], 2)} % of it; RPE over 1 m of path "
+        f"{number(scores['rpe_m'])} m, {number(scores['rpe_deg'], 2)} degrees"
+    )
+
+
+def _floors(one: Mapping[str, Any]) -> list[str]:
+    return [
+        f"floors     {one['truth']} of {one['of']} seen, {one['map']} in the map, {one['right']} with both boundaries "
+        f"within {BOUNDARY_M:g} m: precision {number(one['precision'])}, recall {number(one['recall'])}, mean error "
+        f"{number(one['boundary_error_m'], 2)} m"
     ]
-    top = things["top_k"]
+
+
+def _rooms(one: Mapping[str, Any]) -> list[str]:
+    return [
+        f"rooms      {one['truth']} of {one['of']} seen, {one['map']} in the map: F1 {number(one['f1'])}, "
+        f"precision {number(one['precision'])}, recall {number(one['recall'])} at IoU 0.5; Hydra precision "
+        f"{number(one['hydra_precision'])}, recall {number(one['hydra_recall'])}"
+    ]
+
+
+def _locations(one: Mapping[str, Any]) -> list[str]:
+    curve = " ".join(f"{delta}:{number(f1, 2)}" for delta, f1 in one["f1_at"].items())
+    return [f"locations  {one['truth']} of {one['of']} seen, {one['map']} in the map: F1 by IoU {curve}"]
+
+
+def _objects(one: Mapping[str, Any]) -> list[str]:
+    lines = [
+        f"objects    {one['truth']} of {one['of']} seen well, {one['map']} in the map ({one['aside']} set "
+        f"aside): recall {number(one['recall'])}, precision {number(one['precision'])}, mean IoU "
+        f"{number(one['mean_iou'])}, {number(one['map_per_found'], 2)} map objects for each found one "
+        f"({number(one['map_per_found_any_name'], 2)} whatever the name); recall at IoU 0.5 "
+        f"{number(one['recall_50'])}, at 0.25 whatever the name {number(one['recall_any_name'])}"
+    ]
+    top = one["top_k"]
     if top["objects"]:
         curve = ", ".join(f"{k.replace('_', ' ')} {number(top[k])}" for k in top if k.startswith("top_"))
         lines.append(
             f"names      AUC top-k {number(top['auc'])} of {top['objects']} objects and {top['classes']} classes; "
             f"{curve}"
         )
-    if "connections" in scores:
-        lines += _connections(scores["connections"])
-    if per_class:
-        heads = ("truth", "found", "map", "wrong")
-        rows_of = [(name, *(str(row[head]) for head in heads)) for name, row in things["classes"].items()]
-        lines += ["", table([("class", *heads), *rows_of])]
-    if "questions" in scores:
-        lines += ["", _questions(scores["questions"])]
-    return "\n".join(lines)
+    return lines
+
+
+def _classes(classes: Mapping[str, Mapping[str, int]]) -> str:
+    heads = ("truth", "found", "map", "wrong")
+    return table([("class", *heads), *((name, *(str(row[head]) for head in heads)) for name, row in classes.items())])
 
 
 def _questions(scores: dict[str, Any]) -> str:

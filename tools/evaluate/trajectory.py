@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
+from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.geometry import pose_from_quaternion
+from placegraph.tools.map_folder import read_trajectory
+
 F64 = NDArray[np.float64]
+
+RPE_M = 1.0  # of the given path between the two poses of a pair
+NEAR_NS = 20_000_000  # poses of two clocks' readings belong together; 0.02 s as in the tools of TUM RGB-D
 
 
 def absolute_trajectory_error(estimated: F64, given: F64) -> tuple[float, float]:
@@ -22,7 +32,7 @@ def absolute_trajectory_error(estimated: F64, given: F64) -> tuple[float, float]
     return float(np.sqrt((distances**2).mean())), float(distances.max())
 
 
-def against_given(estimated: dict[int, F64], given: dict[int, F64] | None) -> dict[str, float] | None:
+def against_given(estimated: Mapping[int, F64], given: Mapping[int, F64] | None) -> dict[str, float] | None:
     """ATE of positions by stamp_ns against given poses (4, 4) by the same stamps; None when there are too few pairs."""
     positions = paired(estimated, given)
     if len(positions[0]) < 3:
@@ -37,10 +47,74 @@ def against_given(estimated: dict[int, F64], given: dict[int, F64] | None) -> di
     }
 
 
-def paired(estimated: dict[int, F64], given: dict[int, F64] | None) -> tuple[F64, F64]:
+def trajectory_scores(estimated: Mapping[int, F64], given: Mapping[int, F64] | None) -> dict[str, float] | None:
+    """ATE, also as a share of the path, and RPE of poses (4, 4) by stamp_ns; None for fewer than 3 finite pairs.
+
+    `rpe_m` and `rpe_deg` are for each metre of path.
+    """
+    finite = {stamp: pose for stamp, pose in estimated.items() if np.isfinite(pose).all()}
+    known = {stamp: pose for stamp, pose in (given or {}).items() if np.isfinite(pose).all()}
+    found = against_given({stamp: pose[:3, 3] for stamp, pose in finite.items()}, known)
+    if found is None:
+        return None
+    both = sorted(finite.keys() & known.keys())
+    mine, true = (np.array([poses[stamp] for stamp in both]) for poses in (finite, known))
+    off_m, off_deg = relative_pose_error(mine, true)
+    path_m = found["path_m"]
+    part = found["ate_rmse_m"] / path_m if path_m else float("nan")
+    return found | {"ate_share": part, "rpe_m": off_m, "rpe_deg": off_deg}
+
+
+def relative_pose_error(estimated: F64, given: F64, length_m: float = RPE_M) -> tuple[float, float]:
+    """Rmse of the error of motions over a length of the given path: metres and degrees, each for a metre of path.
+
+    Poses (N, 4, 4) world_from_camera by time. Each pose and the first that is `length_m` of given path later are a
+    pair; NaN when the path is shorter. Source: Sturm et al. 2012, section IV.B; departs: pairs by length of path and
+    not by time, so that standing still adds nothing.
+    """
+    steps = np.linalg.norm(np.diff(given[:, :3, 3], axis=0), axis=1)
+    walked = np.concatenate(([0.0], np.cumsum(steps)))
+    ends = np.searchsorted(walked, walked + length_m - 1e-9)
+    starts = np.flatnonzero(ends < len(given))
+    if not len(starts):
+        return float("nan"), float("nan")
+    ends = ends[starts]
+    moved, true = (np.linalg.inv(poses[starts]) @ poses[ends] for poses in (estimated, given))
+    from scipy.spatial.transform import Rotation  # here: `placegraph` starts without scipy
+
+    error, length = np.linalg.inv(true) @ moved, walked[ends] - walked[starts]
+    off_m = np.linalg.norm(error[:, :3, 3], axis=1) / length
+    off_deg = np.degrees(Rotation.from_matrix(error[:, :3, :3]).magnitude()) / length
+    return float(np.sqrt((off_m**2).mean())), float(np.sqrt((off_deg**2).mean()))
+
+
+def read_poses(file: Path) -> dict[int, F64]:
+    """World_from_camera (4, 4) by stamp_ns of a map's trajectory.txt. Raises SchemaError naming the line."""
+    positions = read_trajectory(file)  # checks every line
+    rows = [line.split() for line in file.read_text("utf-8").splitlines() if line.strip() and line[0] != "#"]
+    if len(rows) != len(positions):
+        raise SchemaError(f"{file}: a time appears twice")
+    found = {}
+    for (stamp_ns, xyz), row in zip(positions.items(), rows, strict=True):
+        turn = np.array(row[4:], float)
+        if not turn.any():
+            raise SchemaError(f"{file}: the pose at {row[0]} has the quaternion 0 0 0 0")
+        found[stamp_ns] = pose_from_quaternion(xyz, turn)
+    return found
+
+
+def at_times(stamps_ns: Mapping[int, object], given: Mapping[int, F64]) -> dict[int, F64]:
+    """Given poses by the stamps that they are nearest to, none farther than NEAR_NS, each used once."""
+    from placegraph.nodes.camera.tum import associate  # here: `placegraph` starts without the data sets
+
+    mine, theirs = (np.array(sorted(stamps), np.int64) for stamps in (stamps_ns, given))
+    return {int(mine[i]): given[int(theirs[j])] for i, j in associate(mine, theirs, NEAR_NS)}
+
+
+def paired(estimated: Mapping[int, F64], given: Mapping[int, F64] | None) -> tuple[F64, F64]:
     """Positions (N, 3) of the stamps at which both are known and finite, by time: estimated, given."""
     pairs = [(estimated[s], given[s][:3, 3]) for s in sorted(estimated) if given and s in given]
-    pairs = [(e, g) for e, g in pairs if np.isfinite(g).all()]
+    pairs = [(e, g) for e, g in pairs if np.isfinite(e).all() and np.isfinite(g).all()]
     return np.array([e for e, _ in pairs]).reshape(-1, 3), np.array([g for _, g in pairs]).reshape(-1, 3)
 
 

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -33,7 +35,7 @@ def turn_about(standing, count: int) -> list[np.ndarray]:
 
 def drifted(true: list[np.ndarray], drift: np.ndarray) -> list[np.ndarray]:
     poses = [true[0]]
-    for a, b in zip(true, true[1:], strict=False):
+    for a, b in itertools.pairwise(true):
         poses.append(poses[-1] @ inverse(a) @ b @ exponential(drift))
     return poses
 

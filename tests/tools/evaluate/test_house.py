@@ -11,10 +11,9 @@ from placegraph.runtime.geometry import inverse, transform
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.tools.evaluate.aligned_map import read_aligned
-from placegraph.tools.evaluate.objects import LEAST_FRAMES
-from placegraph.tools.evaluate.report import number, plain, table
-from placegraph.tools.evaluate.trajectory import level_alignment
+from placegraph.tools.evaluate.house import HOUSE_WORDS, LEAST_FRAMES, known_of, sight_of
 from placegraph.tools.house.build import build
+from placegraph.tools.house.classes import CLASSES
 from placegraph.tools.house.export import HouseOrder, export
 from placegraph.tools.house.questions import AskedQuestion, to_json
 from placegraph.tools.house.truth import Seen, read_truth, truth_of, write_truth
@@ -94,20 +93,6 @@ def perfect(source, tmp_path):
     return write_map(source, tmp_path / "map")
 
 
-def test_the_level_alignment_undoes_a_turn_about_z_and_nothing_else() -> None:
-    walk = np.random.default_rng(0).normal(size=(30, 3))
-    found = level_alignment(transform(MAP_FROM_TRUE, walk), walk)
-    assert found == pytest.approx(inverse(MAP_FROM_TRUE), abs=1e-12)
-    tilted = walk @ Rotation.from_euler("x", 0.2).as_matrix().T
-    assert level_alignment(tilted, walk)[2, :3].tolist() == [0, 0, 1]
-    assert np.isfinite(level_alignment(np.zeros((3, 3)), np.ones((3, 3)))).all()  # a camera that stands
-
-
-def test_a_straight_walk_says_where_the_map_is() -> None:
-    line = np.column_stack((np.arange(5.0), np.zeros(5), np.zeros(5)))
-    assert level_alignment(transform(MAP_FROM_TRUE, line), line) == pytest.approx(inverse(MAP_FROM_TRUE), abs=1e-12)
-
-
 def test_boxes_are_made_anew_from_the_clouds(perfect, source) -> None:
     aligned = read_aligned(perfect, inverse(MAP_FROM_TRUE))
     truth = read_truth(source)
@@ -144,7 +129,10 @@ def test_a_perfect_map_is_perfect_wherever_it_starts(cli, perfect, source) -> No
     truth = read_truth(source)
     assert found["ate_rmse_m"] == 0
     assert found["floors"].pop("boundary_error_m") < 2e-3
-    assert found["floors"] == {"truth": 1, "map": 1, "count_equal": True, "right": 1}
+    assert found["floors"] == {
+        "truth": 1, "of": 1, "map": 1, "count_equal": True, "right": 1, "precision": 1, "recall": 1,
+    }  # fmt: skip
+    assert (found["ate_share"], found["rpe_m"]) == (0, None)  # so few frames are no metre of path
     rooms, places, things = found["rooms"], found["locations"], found["objects"]
     assert (rooms["f1"], rooms["precision"], rooms["recall"]) == (1, 1, 1)
     assert rooms["hydra_precision"] > 0.98 and rooms["hydra_recall"] > 0.98
@@ -204,18 +192,96 @@ def test_without_truth_the_house_options_are_refused(cli, perfect, source, tmp_p
     for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
         (bare / name).symlink_to(source / name)
     assert set(json.loads(cli("evaluate", perfect, "--source", bare, "--json").out)) == {
-        "ate_rmse_m", "ate_max_m", "poses", "path_m",
+        "ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg", "poses_given",
     }  # fmt: skip
+    assert cli("evaluate", perfect, "--source", bare).out.startswith("ATE rmse 0.0 m")
     refused = cli("evaluate", perfect, "--source", bare, "--questions")
     assert refused.code == 2 and "need a house with its truth" in refused.reason
 
 
-def test_an_undefined_number_is_a_dash_and_null() -> None:
-    assert (number(float("nan")), number(0.12345), number(2, 0)) == ("-", "0.123", "2")
-    assert plain({"a": float("nan"), "b": {"c": 0.123456}, "d": 3, "e": True}) == {
-        "a": None, "b": {"c": 0.1235}, "d": 3, "e": True,
+def test_seen_well_needs_frames_and_pixels() -> None:
+    assert sight_of(Seen(0, 99, LEAST_FRAMES)) == "well"
+    assert sight_of(Seen(0, 99, LEAST_FRAMES - 1)) == "poorly" and sight_of(Seen(0, 0, 0)) == "never"
+
+
+def test_every_word_has_one_class() -> None:
+    words = HOUSE_WORDS.class_of_word
+    assert words["couch"] == "sofa" and words["mug"] == "cup" and words["book"] == "book"
+    assert all(words[one.name] == one.name for one in CLASSES)  # normal form of a name is the name itself
+
+
+def test_what_the_walk_did_not_show_is_not_asked_for(source) -> None:
+    truth = read_truth(source)
+    place = next(one for one in truth.locations if len(one.members) >= 3)
+    shown = {place.members[0]}
+    seen = [Seen(one.id, 9, 9 if one.id in shown else 0) for one in truth.objects]
+    nowhere = np.array([[0.0, 0.0, 99.0]])
+    known = known_of(truth, seen, nowhere)
+    assert [one.seen for one in known.floors] == [False]
+    assert [one.id for one, kept in zip(truth.rooms, known.rooms, strict=True) if kept.seen] == [place.room]
+    assert not any(one.seen for one in known.locations)  # one of three members is less than half
+    assert {one.seen for one in known.objects} == {"well", "poorly"}
+    inside = np.array([[*truth.rooms[0].polygon.mean(axis=0), truth.floors[0].z_m + 1.5]])
+    assert known_of(truth, seen, inside).floors[0].seen and known_of(truth, seen, inside).rooms[0].seen
+    climbing = inside - (0, 0, 0.8)  # the camera is above the storey's surface, whoever carries it is not
+    assert not known_of(truth, seen, climbing).floors[0].seen
+
+
+def test_the_truth_of_a_house_as_a_file_gives_the_same_scores(cli, perfect, source, tmp_path) -> None:
+    file = tmp_path / "truth.json"
+    by_source = json.loads(cli("evaluate", perfect, "--source", source, "--write-truth", file, "--json").out)
+    done = cli("evaluate", perfect, "--against", file, "--json")
+    assert done.code == 0, done.err
+    by_file = json.loads(done.out)
+    assert by_source.pop("poses_given") == 4
+    assert by_source.keys() >= by_file.keys() == {
+        "floors", "rooms", "locations", "objects",
+        "ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg",
     }  # fmt: skip
-    assert table([("a", "bb"), ("ccc", "d")]) == "a    bb\nccc   d"
+    for layer in ("floors", "rooms"):
+        assert by_file[layer] == pytest.approx(by_source[layer], abs=2e-3)  # a file rounds to 1 mm
+    assert by_file["locations"]["f1_at"] == by_source["locations"]["f1_at"]
+    assert by_file["objects"]["classes"] == by_source["objects"]["classes"]
+    assert by_file["objects"]["top_k"] == by_source["objects"]["top_k"]
+
+
+def test_a_truth_file_with_parts_left_out(cli, perfect, source, tmp_path) -> None:
+    truth = read_truth(source)
+    file = tmp_path / "truth.json"
+    boxes = [transform(MAP_FROM_TRUE, corners(one.box)) for one in truth.objects]
+    objects = [{"name": o.class_name, "box": extent(b).tolist()} for o, b in zip(truth.objects, boxes, strict=True)]
+    file.write_text(json.dumps({"version": 1, "objects": objects}))  # in the map's frame: no trajectory to lay it by
+    found = json.loads(cli("evaluate", perfect, "--against", file, "--json").out)
+    assert set(found) == {"objects"} and (found["objects"]["recall"], found["objects"]["precision"]) == (1, 1)
+    lines = cli("evaluate", perfect, "--against", file).out.splitlines()
+    assert [line.split()[0] for line in lines] == ["objects", "names", "floors", "rooms", "locations", "trajectory"]
+    assert all("not in the truth: not scored" in line for line in lines[2:])
+
+
+def test_several_maps_are_one_table_with_means(cli, source, tmp_path) -> None:
+    truth = read_truth(source)
+    whole = write_map(source, tmp_path / "whole")
+    half = write_map(source, tmp_path / "half", truth.objects[: len(truth.objects) // 2])
+    two = ("evaluate", whole, half, "--source", source, "--source", source)
+    found = json.loads(cli(*two, "--json").out)
+    assert found["maps"][str(whole)]["objects"]["recall"] == 1
+    recall = found["maps"][str(half)]["objects"]["recall"]
+    assert found["mean"]["obj R"] == pytest.approx((1 + recall) / 2, abs=1e-3) and recall < 0.6
+    lines = cli(*two).out.splitlines()
+    assert [line.split()[0] for line in lines] == ["map", str(whole), str(half), "mean"]
+    file = tmp_path / "rooms.json"
+    polygon = into_map(truth.rooms[0].polygon).tolist()
+    file.write_text(json.dumps({"version": 1, "rooms": [{"polygon": polygon}]}))
+    head = cli("evaluate", whole, half, "--against", file, "--against", file).out.splitlines()[0]
+    assert "room F1" in head and "obj P" not in head and "ATE" not in head
+
+
+def test_only_a_house_has_quarters_and_a_truth_to_write(cli, perfect, source, tmp_path) -> None:
+    for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
+        (tmp_path / name).symlink_to(source / name)
+    for option in (("--progress",), ("--write-truth", tmp_path / "t.json")):
+        done = cli("evaluate", perfect, "--source", tmp_path, *option)
+        assert done.code == 2 and f"{option[0]} needs a house with its truth" in done.reason
 
 
 def test_a_house_of_which_nothing_was_seen_can_be_told(cli, perfect, source, tmp_path) -> None:

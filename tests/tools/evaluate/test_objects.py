@@ -3,19 +3,14 @@ import pytest
 
 from placegraph.runtime.scene_graph import Tag
 from placegraph.tools.evaluate.aligned_map import MapObject
-from placegraph.tools.evaluate.objects import LEAST_FRAMES, class_of_word, object_scores, seen_well, top_k
-from placegraph.tools.house.classes import CLASSES, NAMES
-from placegraph.tools.house.truth import OrientedBox, Seen, TrueObject
+from placegraph.tools.evaluate.house import HOUSE_WORDS
+from placegraph.tools.evaluate.known import KnownObject, Words
+from placegraph.tools.evaluate.objects import object_scores, top_k
+from placegraph.tools.house.classes import NAMES
 
 
 def box(x, size=(1.0, 1.0, 1.0), y=0.0):
     return np.array([[x, y, 0.0], [x + size[0], y + size[1], size[2]]])
-
-
-def truth(*rows):
-    """Rows of (class, box): TrueObjects by id."""
-    turned = OrientedBox(np.zeros(3), np.ones(3), 0.0)
-    return [TrueObject(i, name, 0, 0, -1, -1, "", b, turned, b[[0, 0, 1, 1], :2]) for i, (name, b) in enumerate(rows)]
 
 
 def things(*rows):
@@ -25,24 +20,10 @@ def things(*rows):
     ]
 
 
-def scores(found, true, poor=(), unseen=()):
-    seen = [
-        Seen(i, 0 if i in unseen else LEAST_FRAMES, 0 if i in unseen else LEAST_FRAMES - (i in poor))
-        for i in range(len(true))
-    ]
-    return object_scores(things(*found), truth(*true), seen)
-
-
-def test_seen_well_needs_frames_and_pixels() -> None:
-    assert seen_well(Seen(0, 99, LEAST_FRAMES))
-    assert not seen_well(Seen(0, 99, LEAST_FRAMES - 1))
-
-
-def test_every_word_has_one_class() -> None:
-    words = class_of_word()
-    assert words["couch"] == "sofa" and words["mug"] == "cup" and words["book"] == "book"
-    for one in CLASSES:
-        assert words[one.name] == one.name  # normal form of a name is the name itself
+def scores(found, true, poor=(), unseen=(), words=HOUSE_WORDS):
+    sights = ["never" if i in unseen else "poorly" if i in poor else "well" for i in range(len(true))]
+    known = [KnownObject(name, b, sight) for (name, b), sight in zip(true, sights, strict=True)]
+    return object_scores(things(*found), known, words)
 
 
 def test_nothing_at_all() -> None:
@@ -119,15 +100,50 @@ def test_a_poorly_seen_neighbour_takes_no_map_object_from_one_seen_well() -> Non
 
 
 def test_top_k_ranks_the_true_class_by_the_tags() -> None:
-    assert top_k([]) == {"objects": 0, "classes": len(NAMES)}
-    exact = top_k([((Tag("sofa", 2.0),), "sofa")])
+    assert top_k([], HOUSE_WORDS) == {"objects": 0, "classes": len(NAMES)}
+    exact = top_k([((Tag("sofa", 2.0),), "sofa")], HOUSE_WORDS)
     assert exact["top_1"] == 1 and exact["auc"] == 1
-    outvoted = top_k([((Tag("bed", 5.0), Tag("sofa", 1.0)), "sofa")])
+    outvoted = top_k([((Tag("bed", 5.0), Tag("sofa", 1.0)), "sofa")], HOUSE_WORDS)
     assert outvoted["top_1"] == 0 and outvoted["top_10"] == 1 and 0.8 < outvoted["auc"] < 1
-    both = top_k([((Tag("sofa", 2.0),), "sofa"), ((Tag("bed", 5.0), Tag("sofa", 1.0)), "sofa")])
+    both = top_k([((Tag("sofa", 2.0),), "sofa"), ((Tag("bed", 5.0), Tag("sofa", 1.0)), "sofa")], HOUSE_WORDS)
     assert both["top_1"] == 0.5 and both["auc"] == pytest.approx((1 + outvoted["auc"]) / 2)
 
 
-def test_an_object_without_tags_ranks_no_class_above_another() -> None:
+def test_an_object_without_tags_gets_no_credit_for_the_order_of_equals() -> None:
     found = scores([("", box(0))], [("sofa", box(0))])
     assert found["top_k"]["objects"] == 1 and found["classes"]["(no name)"]["wrong"] == 1
+    count = len(NAMES)
+    assert found["top_k"]["top_1"] == pytest.approx(1 / count)
+    assert found["top_k"]["auc"] == pytest.approx((count + 1) / (2 * count))  # what guessing gets
+
+
+def test_fewer_classes_than_k() -> None:
+    one = top_k([((Tag("bed", 1.0),), "sofa")], Words({"sofa": []}))
+    assert (one["top_1"], one["top_10"], one["auc"], one["classes"]) == (1, 1, 1, 1)
+
+
+def test_all_objects_twice() -> None:
+    true = [("sofa", box(0)), ("bed", box(3)), ("chair", box(6))]
+    found = scores([*true, *true], true)
+    assert (found["recall"], found["precision"], found["map_per_found"], found["map_per_found_any_name"]) == (
+        1,
+        0.5,
+        2,
+        2,
+    )
+    renamed = scores([*true, *(("lamp", b) for _, b in true)], true)
+    assert (renamed["map_per_found"], renamed["map_per_found_any_name"], renamed["precision"]) == (1, 2, 0.5)
+
+
+def test_one_object_in_three_pieces_and_two_in_one() -> None:
+    thirds = [("bed", box(x, (1.0, 3.0, 1.0))) for x in (0.0, 1.0, 2.0)]
+    split = scores(thirds, [("bed", box(0, (3.0, 3.0, 1.0)))])
+    assert (split["recall"], split["precision"], split["map_per_found"]) == (1, pytest.approx(1 / 3, abs=1e-4), 3)
+    merged = scores([("bed", box(0, (2.0, 1.0, 1.0)))], [("bed", box(0)), ("bed", box(1))])
+    assert (merged["recall"], merged["precision"], merged["map_per_found"]) == (0.5, 1, 1)
+
+
+def test_a_box_without_volume_overlaps_nothing() -> None:
+    point = np.zeros((2, 3))
+    found = scores([("sofa", point)], [("sofa", point)])
+    assert found["recall_any_name"] == 0 and found["recall"] == 1  # but it is thin, and found by its centre

@@ -74,3 +74,39 @@ def test_floors_are_paired_by_their_surfaces_and_judged_by_the_worse_boundary() 
     assert match_floors(three, true) == [(1, 1, pytest.approx(0.1)), (0, 0, pytest.approx(0.3))]
     merged = np.array([[0.1, 5.3]])
     assert match_floors(merged, true) == [(0, 0, pytest.approx(2.8))]
+    assert match_floors(np.array([[0.1, 2.4], [8, 10]]), true) == [(0, 0, pytest.approx(0.1))]  # no height in common
+    assert match_floors(true, np.zeros((0, 2))) == []
+
+
+def test_more_floors_than_truth_pair_each_true_one_once() -> None:
+    found = np.array([[0.0, 2.5], [0.2, 2.5], [2.8, 5.3], [2.9, 5.2]])
+    pairs = match_floors(found, np.array([[0, 2.5], [2.8, 5.3]]))
+    assert sorted((i, j) for i, j, _ in pairs) == [(0, 0), (2, 1)]
+
+
+def strip(x, width, depth=3.0):
+    return 0, np.array([[x, 0], [x + width, 0], [x + width, depth], [x, depth]])
+
+
+def test_a_room_split_in_three() -> None:
+    found = overlaps([strip(0, 1), strip(1, 1), strip(2, 1)], [strip(0, 3)])
+    assert hydra(found) == (pytest.approx(1), pytest.approx(1 / 3))
+    assert matched(found.iou, 0.5).f1 == 0 and matched(found.iou, 0.3).f1 == 0.5  # one right, two wrong, none missed
+
+
+def test_two_rooms_merged() -> None:
+    equal = overlaps([strip(0, 4)], [strip(0, 2), strip(2, 2)])
+    assert hydra(equal) == (pytest.approx(0.5), pytest.approx(1))
+    assert matched(equal.iou, 0.5).f1 == 0  # each is half of it, and more than .5 is asked for
+    large = overlaps([strip(0, 4)], [strip(0, 3), strip(3, 1)])
+    scores = matched(large.iou, 0.5)
+    assert (scores.precision, scores.recall, scores.f1) == (1, 0.5, pytest.approx(2 / 3))
+
+
+def test_areas_far_apart_need_no_grid_of_all_between() -> None:
+    found = overlaps([square(0, 0), square(9000, -9000)], [square(9000, -9000)])
+    assert found.iou.tolist() == [[0], [1]]
+
+
+def test_areas_that_touch_share_nothing() -> None:
+    assert overlaps([square(0, 0)], [square(1, 0), square(0, -1), square(1, 1)]).shared.tolist() == [[0, 0, 0]]

@@ -6,10 +6,22 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from placegraph.nodes.camera import detect
+from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.geometry import inverse, transform
 from placegraph.runtime.messages import Pose
 from placegraph.tools.evaluate import absolute_trajectory_error, against_given
+from placegraph.tools.evaluate.trajectory import (
+    at_times,
+    level_alignment,
+    read_poses,
+    relative_pose_error,
+    trajectory_scores,
+)
 from placegraph.tools.map_folder import write_trajectory
 
+MOTION = np.eye(4)
+MOTION[:3, :3] = Rotation.from_euler("z", 0.7).as_matrix()
+MOTION[:3, 3] = (4, -5, 0.6)
 SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
 
 
@@ -68,6 +80,85 @@ def test_pairs_are_those_with_equal_stamps_and_finite_poses() -> None:
     assert against_given(estimated, None) is None and against_given(estimated, {}) is None
 
 
+def line(count, step=0.25, drift=0.0, turn_rad=0.0):
+    """(count, 4, 4) poses along x, `step` apart; each also goes `drift` along y and turns about z."""
+    found = np.tile(np.eye(4), (count, 1, 1))
+    for k in range(count):
+        found[k, :3, :3] = Rotation.from_euler("z", turn_rad * k).as_matrix()
+    found[:, 0, 3], found[:, 1, 3] = step * np.arange(count), drift * np.arange(count)
+    return found
+
+
+def test_the_relative_error_is_the_drift_for_each_metre() -> None:
+    assert relative_pose_error(line(9), line(9)) == (0, 0)
+    assert relative_pose_error(line(9, drift=0.01), line(9)) == (pytest.approx(0.04), pytest.approx(0))
+    off_m, off_deg = relative_pose_error(line(9, turn_rad=np.radians(0.5)), line(9))
+    assert off_deg == pytest.approx(2) and off_m > 0  # seen from a pose that is turned the same way leads elsewhere
+    # steps of 2 m are longer than what a pair spans: the error is still given for one metre
+    assert relative_pose_error(line(5, 2.0, drift=0.1), line(5, 2.0))[0] == pytest.approx(0.05)
+
+
+def test_a_motion_of_the_whole_world_is_no_relative_error() -> None:
+    moved = np.eye(4)
+    moved[:3, :3] = Rotation.from_euler("xyz", (0.3, 0.1, 2)).as_matrix()
+    moved[:3, 3] = (5, 6, 7)
+    assert relative_pose_error(moved @ line(9), line(9)) == pytest.approx((0, 0), abs=1e-6)
+
+
+@pytest.mark.parametrize("given", [line(4), line(9, 0.0), line(0)], ids=["short", "standing", "empty"])
+def test_a_path_too_short_for_a_relative_error(given) -> None:
+    assert np.isnan(relative_pose_error(given, given)).all()
+
+
+def test_the_scores_of_a_trajectory_leave_out_poses_that_are_not_finite() -> None:
+    given, estimated = dict(enumerate(line(9))), dict(enumerate(line(9, drift=0.01)))
+    given[2], estimated[5] = np.full((4, 4), np.nan), np.full((4, 4), np.inf)
+    found = trajectory_scores(estimated, given)
+    assert found["poses"] == 7 and found["path_m"] == 2 and np.isfinite(list(found.values())).all()
+    assert found["ate_share"] == pytest.approx(found["ate_rmse_m"] / 2)
+    assert trajectory_scores({0: given[0], 1: given[1], 5: estimated[5]}, given) is None
+    assert trajectory_scores(estimated, None) is None
+    still = dict(enumerate(line(9, 0.0)))
+    assert np.isnan(trajectory_scores(still, still)["ate_share"])
+
+
+def test_times_of_another_clock_reading_are_matched_by_nearness() -> None:
+    given = {30_000_000: line(1)[0], 1_000_000_000: line(2)[1]}
+    found = at_times({0: None, 15_000_000: None, 999_000_000: None}, given)
+    assert sorted(found) == [15_000_000, 999_000_000] and found[999_000_000] is given[1_000_000_000]
+    assert at_times({}, given) == {} and at_times({0: None}, {}) == {}
+
+
+def test_poses_of_a_file_are_checked(tmp_path) -> None:
+    file = tmp_path / "trajectory.txt"
+    file.write_text("# none\n")
+    assert read_poses(file) == {}
+    file.write_text("# one\n1.5 1 2 3 0 0 1 0\n")
+    assert read_poses(file)[1_500_000_000][:3] == pytest.approx(
+        np.array([[-1, 0, 0, 1], [0, -1, 0, 2], [0, 0, 1, 3.0]])
+    )
+    file.write_text("1.5 1 2 3 0 0 1 0\n1.5 1 2 3 0 0 1 0\n")
+    with pytest.raises(SchemaError, match="a time appears twice"):
+        read_poses(file)
+    file.write_text("1.5 1 2 3 0 0 0 0\n")
+    with pytest.raises(SchemaError, match=r"the pose at 1\.5 has the quaternion 0 0 0 0"):
+        read_poses(file)
+
+
+def test_the_level_alignment_undoes_a_turn_about_z_and_nothing_else() -> None:
+    walk = np.random.default_rng(0).normal(size=(30, 3))
+    found = level_alignment(transform(MOTION, walk), walk)
+    assert found == pytest.approx(inverse(MOTION), abs=1e-12)
+    tilted = walk @ Rotation.from_euler("x", 0.2).as_matrix().T
+    assert level_alignment(tilted, walk)[2, :3].tolist() == [0, 0, 1]
+    assert np.isfinite(level_alignment(np.zeros((3, 3)), np.ones((3, 3)))).all()  # a camera that stands
+
+
+def test_a_straight_walk_says_where_the_map_is() -> None:
+    line = np.column_stack((np.arange(5.0), np.zeros(5), np.zeros(5)))
+    assert level_alignment(transform(MOTION, line), line) == pytest.approx(inverse(MOTION), abs=1e-12)
+
+
 @pytest.fixture
 def track(tmp_path, seven):
     """A map folder whose trajectory is the given one of `seven`, moved and turned, with the last point 0.3 m off."""
@@ -105,13 +196,13 @@ def test_the_command_on_a_moved_copy(cli, track, seven) -> None:
     done = cli("evaluate", track(), "--source", seven, "--json")
     assert done.code == 0 and done.err == ""
     found = json.loads(done.out)
-    assert set(found) == {"ate_rmse_m", "ate_max_m", "poses", "path_m"}
+    assert set(found) == {"ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg", "poses_given"}
     assert (found["ate_rmse_m"], found["ate_max_m"], found["poses"]) == (0.0, 0.0, 4) and found["path_m"] > 1
 
 
 def test_the_command_in_words(cli, track, seven) -> None:
     done = cli("evaluate", track(0.3), "--source", seven)
-    assert done.out.startswith("ATE rmse 0.") and done.out.endswith(" m of path\n") and "rmse 0.0 m" not in done.out
+    assert done.out.startswith("ATE rmse 0.") and " m of path: " in done.out and "rmse 0.0 m" not in done.out
 
 
 def test_errors_name_the_file(cli, track, seven, tmp_path) -> None:
