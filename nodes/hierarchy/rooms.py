@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
+from placegraph.nodes.hierarchy.flood import Neck, flood
 
 Bool = NDArray[np.bool_]
 F32 = NDArray[np.float32]
@@ -158,93 +159,16 @@ def segment_rooms(walls: Bool, observed: Bool, config: RoomConfig) -> I32:
         return observed.astype(np.int32)
     field = distance_field(walls, config)
     field[~open_space] = 0
-    return flood(field, open_space, config)
+    labels = flood(field, open_space, config.cell_m, config.seed_min_m / 2, lambda neck: _is_door(neck, config))
+    return labels if labels.any() else open_space.astype(np.int32)  # all of it is narrower than a seed
+
+
+def _is_door(neck: Neck, config: RoomConfig) -> bool:
+    """A neck at most as wide as a door and narrower than what lies on either side parts rooms."""
+    return 2 * neck.level <= config.door_m and neck.level <= config.neck_share * min(neck.heights)
 
 
 def distance_field(walls: Bool, config: RoomConfig) -> F32:
     """Metres to the nearest wall, lightly smoothed. Source: paper, room layer (EDF)."""
     field = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * config.cell_m
     return np.asarray(cv2.GaussianBlur(field, (0, 0), config.smooth_m / config.cell_m), np.float32)
-
-
-def flood(field: F32, space: Bool, config: RoomConfig) -> I32:
-    """Watershed of a distance field (metres) inside `space`, from the highest level down.
-
-    Every maximum is a seed; where two basins meet, the level is half the width of the neck between them, and they are
-    one room unless it is as narrow as a door and narrower than either. Returns labels 1..n, 0 elsewhere.
-    """
-    labels = np.zeros(field.shape, np.int32)
-    heights: dict[int, float] = {}  # distance field at the seed of each basin
-    parted: set[tuple[int, int]] = set()
-    levels = np.arange(float(field.max()), config.seed_min_m / 2, -config.cell_m).tolist()
-    for level in levels:
-        mask = space & (field >= level)
-        for new in _unlabelled_parts(mask, labels):
-            number = len(heights) + 1
-            heights[number] = level
-            labels[new] = number
-        _grow(labels, mask)
-        _join_basins(labels, heights, parted, level, config)
-    _grow(labels, space)
-    found, numbers = np.unique(labels[labels > 0], return_inverse=True)
-    if not len(found):  # all of it is narrower than a seed
-        return space.astype(np.int32)
-    labels[labels > 0] = numbers + 1
-    return labels
-
-
-def _unlabelled_parts(mask: Bool, labels: I32) -> list[tuple[NDArray[np.int64], ...]]:
-    _, parts = cv2.connectedComponents(mask.view(np.uint8), connectivity=4)
-    known = np.zeros(int(parts.max()) + 1, bool)
-    known[parts[labels > 0]] = True
-    known[0] = True
-    return [np.nonzero(parts == part) for part in np.flatnonzero(~known)]
-
-
-def _grow(labels: I32, mask: Bool) -> None:
-    """Let basins grow into the free cells of a mask, one ring at a time; the later basin wins a tie."""
-    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-    rest = mask & (labels == 0)
-    while rest.any():
-        spread = cv2.dilate(labels.astype(np.float32), cross).astype(np.int32)  # dilation knows no int32
-        reached = rest & (spread > 0)
-        if not reached.any():
-            return
-        labels[reached] = spread[reached]
-        rest &= ~reached
-
-
-def _join_basins(
-    labels: I32, heights: dict[int, float], parted: set[tuple[int, int]], level: float, config: RoomConfig
-) -> None:
-    heir: dict[int, int] = {}
-    for pair in _touching(labels):
-        a, b = (_last_heir(heir, number) for number in pair)
-        if a == b or (min(a, b), max(a, b)) in parted:
-            continue
-        if 2 * level <= config.door_m and level <= config.neck_share * min(heights[a], heights[b]):
-            parted.add((min(a, b), max(a, b)))
-            continue
-        kept, gone = (a, b) if heights[a] >= heights[b] else (b, a)
-        heir[gone] = kept
-        for old in [pair for pair in parted if gone in pair]:
-            parted.discard(old)
-            other = old[0] if old[1] == gone else old[1]
-            parted.add((min(kept, other), max(kept, other)))
-    if heir:
-        table = np.array([0, *(_last_heir(heir, number) for number in heights)], np.int32)
-        labels[:] = table[labels]
-
-
-def _last_heir(heir: dict[int, int], number: int) -> int:
-    while number in heir:
-        number = heir[number]
-    return number
-
-
-def _touching(labels: I32) -> list[tuple[int, int]]:
-    found: set[tuple[int, int]] = set()
-    for a, b in ((labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])):
-        meet = (a != b) & (a > 0) & (b > 0)
-        found |= set(zip(np.minimum(a[meet], b[meet]).tolist(), np.maximum(a[meet], b[meet]).tolist(), strict=True))
-    return sorted(found)
