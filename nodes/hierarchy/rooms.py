@@ -1,10 +1,10 @@
 """Rooms of one floor from the walls seen from above.
 
 Source: paper, room layer (bird's-eye view, min-max, threshold, walls, distance field, Otsu seeds, watershed), with
-HOV-SG's working values. Departs: a cell weighs by how much of the wall slice's height is occupied, not by its number of
-points; rooms are limited to what was observed (rays and points); seeds are the maxima of the distance field that a
-doorway parts, since Otsu's one threshold hides a narrow corridor beside a hall; flooding follows the distance field
-level by level, since cv2.watershed orders pixels by steps of colour instead.
+HOV-SG's working values. Departs: a wall is what fills a little of the slice's height in a piece of some length, so that
+the lintel of a door or archway parts rooms, however few points it has; rooms are limited to what was observed (rays and
+points); seeds are the maxima of the distance field that a doorway parts, since Otsu's one threshold hides a narrow
+corridor beside a hall.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 
     cell_m: float = 0.05  # HOV-SG
     slice_low_m: float = 1.5  # above the floor, HOV-SG
-    slice_high_m: float = 0.3  # below the ceiling, HOV-SG
+    slice_high_m: float = 0.1  # below the ceiling; departs: HOV-SG's .3 cuts the lintels that a low camera sees
     least_slice_m: float = 0.3  # departs: a scan that shows less than this of the slice has walls from lower down
     partial_low_m: float = 1.0  # ... namely from here: over tables and the backs of chairs
     level_m: float = 0.1  # a wall counts by the levels of this height that it fills
-    wall_share: float = 0.25  # of the maximum, HOV-SG
+    wall_fill_m: float = 0.2  # departs: of the slice; HOV-SG's .25 of the fullest cell has no room for a lintel
     smooth_m: float = 0.1  # of the distance field, departs: HOV-SG smooths over .5 m, which closes corridors
     seed_min_m: float = 0.5  # HOV-SG: drop seeds under .5 m across
     door_m: float = 1.6  # departs: openings up to this wide part rooms; best of 1.2, 1.4, 1.6 on 8 real maps (ipa)
     neck_share: float = 0.7  # departs: ... if they are this much narrower than the smaller room
     close_m: float = 0.3  # gaps in what was observed that are closed
     room_min_m2: float = 1.0
-    wall_min_m: float = 1.0  # less wall than this in all parts no rooms; in a plan, shorter pieces are furniture
+    wall_min_m: float = 1.0  # shorter pieces are furniture and lamps; less wall than this in all parts no rooms
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +118,16 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomCon
     tall = (above >= low) & (above <= high)
     rows, columns = grid.cells(points_world[tall])
     levels = np.floor((above[tall] - low) / config.level_m).astype(np.int64)
-    filled = np.unique((levels * grid.shape[0] + rows) * grid.shape[1] + columns) % (grid.shape[0] * grid.shape[1])
-    density = np.bincount(filled, minlength=grid.shape[0] * grid.shape[1]).reshape(grid.shape).astype(np.float32)
-    if density.max() == 0:
-        return np.zeros(grid.shape, bool)
-    density = cv2.GaussianBlur(density / density.max(), (3, 3), 0)
-    walls = (density > config.wall_share * density.max()).astype(np.uint8)
-    return cv2.morphologyEx(walls, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)).astype(bool)
+    kernel = np.ones((3, 3), np.uint8)
+    filled = np.zeros(grid.shape, np.uint8)  # a cell's number of levels
+    for level in range(int(levels.max(initial=-1)) + 1):
+        here, seen = levels == level, np.zeros(grid.shape, np.uint8)
+        seen[rows[here], columns[here]] = 1
+        # a wall seen from a few places has holes: a cell's neighbours stand in for it, and the erosion takes it back
+        filled += np.asarray(cv2.dilate(seen, kernel), np.uint8)
+    walls = (filled >= round(config.wall_fill_m / config.level_m)).astype(np.uint8)
+    walls = cv2.erode(cv2.morphologyEx(walls, cv2.MORPH_CLOSE, kernel), kernel)
+    return walls_of_plan(np.asarray(walls, bool), config)
 
 
 def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid: Grid, config: RoomConfig) -> Bool:
@@ -141,7 +144,7 @@ def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid:
 
 
 def walls_of_plan(occupied: Bool, config: RoomConfig) -> Bool:
-    """Walls of a plan without heights: its occupied pieces of `wall_min_m` or more; shorter ones are furniture.
+    """Walls: what is occupied in pieces of `wall_min_m` or more; shorter ones are furniture and lamps.
 
     Source: ours, measured on the ipa maps (README, "Results").
     """
