@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.flood import Neck, flood
+from placegraph.nodes.hierarchy.floors import FloorSpan
 
 Bool = NDArray[np.bool_]
 F32 = NDArray[np.float32]
