@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,11 @@ from placegraph.nodes.hierarchy.approach import Target
 from placegraph.nodes.hierarchy.connections import FloorPlan, PlacedObject, PlaceGraph, PlaceGraphBuilder
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floors
 from placegraph.nodes.hierarchy.ground import TravelConfig
+from placegraph.nodes.hierarchy.homes import HomeRoom, find_homes
 from placegraph.nodes.hierarchy.identity import Identities, Place, span_footprint
-from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
+from placegraph.nodes.hierarchy.locations import LocationArea, LocationConfig, find_locations
 from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, find_rooms
+from placegraph.nodes.hierarchy.unchanged import Unchanged, digest
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.geometry import bounding_box, convex_footprint
 from placegraph.runtime.messages import Map
@@ -35,15 +37,6 @@ class LayerConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     travel: TravelConfig = TravelConfig()
 
 
-@dataclass(frozen=True, eq=False)
-class _Room:
-    id: str
-    floor: str
-    span: FloorSpan
-    grid: Grid
-    area: RoomArea
-
-
 class GraphBuilder:
     """Builds a graph from each Map and remembers which place has which id."""
 
@@ -52,6 +45,9 @@ class GraphBuilder:
         self._config, self._detector = config, detector
         self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
         self._places = PlaceGraphBuilder(config.travel, config.floors, config.rooms)
+        self._known_rooms: Unchanged[tuple[Grid, list[RoomArea], F64]] = Unchanged()
+        self._known_locations: Unchanged[list[LocationArea]] = Unchanged()
+        self._known_footprints: Unchanged[F64] = Unchanged()
 
     def build(self, world: Map) -> SceneGraph:
         """The graph of a Map; rooms and locations are without names. Deterministic in the sequence of maps.
@@ -66,17 +62,18 @@ class GraphBuilder:
         points = world.points_world if len(world.points_world) else world.object_points_world
         floor_ids = self._floors.assign([Place(span_footprint(s.low, max(s.high, s.low + 0.1))) for s in spans])
         nodes = [_building(points)]
-        rooms: list[_Room] = []
+        rooms: list[HomeRoom] = []
         for i, (span, floor_id) in enumerate(zip(spans, floor_ids, strict=True)):
-            inside = _in_zone(points, span)
-            nodes.append(_place(floor_id, "B0", span, convex_footprint(inside), (Tag(f"floor {i + 1}", 1.0),)))
-            rooms += self._find_rooms(
-                inside, _in_zone(world.free_points_world, span), world.free_cell_m, span, floor_id
-            )
+            inside, free = _in_zone(points, span), _in_zone(world.free_points_world, span)
+            grid, areas, outline = self._find_rooms(inside, free, world.free_cell_m, span)
+            ids = self._rooms.assign([Place(area.outline, floor_id) for area in areas])
+            nodes.append(_place(floor_id, "B0", span, outline, (Tag(f"floor {i + 1}", 1.0),)))
+            rooms += [HomeRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
         nodes += [_place(room.id, room.floor, room.span, room.area.outline) for room in rooms]
-        home = [_home(xyz, rooms) for xyz in objects]
-        for room in rooms:
-            nodes += self._fill(room, [i for i, at in enumerate(home) if at is room], objects, world)
+        home = find_homes(objects, rooms)
+        nodes += self._fill(rooms, home, objects, world)
+        for known in (self._known_rooms, self._known_locations, self._known_footprints):
+            known.turn()
         nodes = _with_frames(nodes)
         placed = _placed(nodes, {f"O{number}": room.id for number, room in zip(world.object_ids, home, strict=True)})
         places = self._connect(world, list(zip(spans, floor_ids, strict=True)), rooms, placed)
@@ -84,7 +81,7 @@ class GraphBuilder:
         return SceneGraph.of(nodes, places.connections, places.ways)
 
     def _connect(
-        self, world: Map, floors: list[tuple[FloorSpan, str]], rooms: list[_Room], objects: list[PlacedObject]
+        self, world: Map, floors: list[tuple[FloorSpan, str]], rooms: list[HomeRoom], objects: list[PlacedObject]
     ) -> PlaceGraph:
         points = world.points_world if len(world.points_world) else world.object_points_world
         plans = []
@@ -96,24 +93,46 @@ class GraphBuilder:
         return self._places.build(world, plans, objects)
 
     def _find_rooms(
-        self, points: Points, free_points: Points, free_cell_m: float, span: FloorSpan, floor_id: str
-    ) -> list[_Room]:
-        grid, areas = find_rooms(points, free_points, free_cell_m, span, self._config.rooms)
-        ids = self._rooms.assign([Place(area.outline, floor_id) for area in areas])
-        return [_Room(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
+        self, points: Points, free: Points, free_cell_m: float, span: FloorSpan
+    ) -> tuple[Grid, list[RoomArea], F64]:
+        """Rooms of a floor and its own outline, made again only when its points, free space or heights changed."""
 
-    def _fill(self, room: _Room, members: list[int], objects: list[Points], world: Map) -> list[Node]:
-        mine = [objects[i] for i in members]
-        areas = find_locations(mine, room.span, self._config.locations, self._detector)
-        ids = self._locations.assign([Place(area.outline, room.floor) for area in areas])
-        parent = dict.fromkeys(members, room.id)
+        def make() -> tuple[Grid, list[RoomArea], F64]:
+            return *find_rooms(points, free, free_cell_m, span, self._config.rooms), convex_footprint(points)
+
+        return self._known_rooms.get(digest(points, free, free_cell_m, span.low, span.high), make)
+
+    def _fill(self, rooms: list[HomeRoom], home: list[HomeRoom], objects: list[Points], world: Map) -> list[Node]:
+        """Locations of all rooms, then the objects in them; a room's are found again only when its objects changed."""
+        digests = [digest(xyz) for xyz in objects]
+        members: dict[str, list[int]] = {room.id: [] for room in rooms}
+        for i, room in enumerate(home):
+            members[room.id].append(i)
+        found = [(room, area) for room in rooms for area in self._find_locations(room, members, objects, digests)]
+        # all of them at once: an id goes to one place, also when a room is split
+        ids = self._locations.assign([Place(area.outline, room.floor) for room, area in found])
+        parent = [room.id for room in home]
         nodes = []
-        for location_id, area in zip(ids, areas, strict=True):
-            held = [members[k] for k in area.members]
-            parent.update(dict.fromkeys(held, location_id))
+        for location_id, (room, area) in zip(ids, found, strict=True):
+            held = [members[room.id][k] for k in area.members]
+            for i in held:
+                parent[i] = location_id
             box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
-        return nodes + [_object(i, parent[i], objects[i], world) for i in members]
+        for i, key in enumerate(digests):
+            footprint = self._known_footprints.get(key, lambda i=i: convex_footprint(objects[i]))  # type: ignore[misc]
+            nodes.append(_object(i, parent[i], footprint, world))
+        return nodes
+
+    def _find_locations(
+        self, room: HomeRoom, members: dict[str, list[int]], objects: list[Points], digests: list[bytes]
+    ) -> list[LocationArea]:
+        mine = members[room.id]
+        key = digest(room.span.low, room.span.high, *(digests[i] for i in mine))
+        return self._known_locations.get(
+            key,
+            lambda: find_locations([objects[i] for i in mine], room.span, self._config.locations, self._detector),
+        )
 
 
 def _placed(nodes: list[Node], room_of: dict[str, str]) -> list[PlacedObject]:
@@ -138,25 +157,6 @@ def _in_zone(xyz: Points, span: FloorSpan) -> Points:
     return xyz[(xyz[:, 2] >= span.zone_low) & (xyz[:, 2] <= span.zone_high)]
 
 
-def _home(xyz: Points, rooms: list[_Room]) -> _Room:
-    """The room that holds most of an object's points; without any, the nearest one of its floor."""
-    middle = xyz.mean(axis=0)
-    # the zones of floors meet with a small gap, and an object may reach over it: its middle decides
-    distance = [max(room.span.zone_low - middle[2], middle[2] - room.span.zone_high, 0.0) for room in rooms]
-    floor = rooms[int(np.argmin(distance))].floor
-    here = [room for room in rooms if room.floor == floor]
-    counts = [int(room.area.mask[room.grid.cells(xyz)].sum()) for room in here]
-    if max(counts) > 0:
-        return here[int(np.argmax(counts))]
-
-    def gap(room: _Room) -> float:
-        rows, columns = np.nonzero(room.area.mask)
-        cells = room.grid.origin + (np.stack((columns, rows), axis=1) + 0.5) * room.grid.cell_m
-        return float(np.linalg.norm(cells - middle[:2], axis=1).min())
-
-    return min(here, key=gap)
-
-
 def _building(points: Points) -> Node:
     if not len(points):
         return _node("B0", "", np.zeros((2, 3)), np.zeros((0, 2)))
@@ -168,14 +168,14 @@ def _place(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tu
     return _node(node_id, parent, box, outline, tags=tags)
 
 
-def _object(i: int, parent: str, xyz: Points, world: Map) -> Node:
+def _object(i: int, parent: str, footprint: F64, world: Map) -> Node:
     votes = slice(int(world.tag_offsets[i]), int(world.tag_offsets[i + 1]))
     names, weights = world.tag_names[votes], world.tag_votes[votes].tolist()
     return _node(
         f"O{int(world.object_ids[i])}",
         parent,
         world.object_boxes_world[i],
-        convex_footprint(xyz),
+        footprint,
         tags=tuple(Tag(name, weight) for name, weight in zip(names, weights, strict=True)),
         first_frame=int(world.object_first_frames[i]),
         last_frame=int(world.object_last_frames[i]),

@@ -35,10 +35,12 @@ class Identities:
         """Ids for places, the best total overlap with known ones winning, new ids in the order given."""
         numbers = [-1] * len(places)
         if places and self._known:
-            iou = np.array([[overlap(place, known) for known in self._known] for place in places])
+            iou = self._overlaps(places)
+            rows, columns = np.flatnonzero(iou.any(axis=1)), np.flatnonzero(iou.any(axis=0))
+            iou = iou[np.ix_(rows, columns)]  # of a large building a small part
             for row, column in zip(*linear_sum_assignment(-iou), strict=True):
                 if iou[row, column] >= LEAST_IOU:
-                    numbers[row] = int(column)
+                    numbers[rows[row]] = int(columns[column])
         for i, place in enumerate(places):
             if numbers[i] < 0:
                 numbers[i] = len(self._known)
@@ -47,17 +49,31 @@ class Identities:
                 self._known[numbers[i]] = place
         return [f"{self._letter}{number}" for number in numbers]
 
+    def _overlaps(self, places: Sequence[Place]) -> NDArray[np.float64]:
+        """IoU (places, known); only pairs of one group whose boxes meet are drawn."""
+        a, b = (np.array([_box(place) for place in some]) for some in (places, self._known))
+        meet = ((a[:, None, 0] < b[None, :, 1]) & (b[None, :, 0] < a[:, None, 1])).all(axis=2)
+        groups = np.array([place.group for place in places])[:, None] == [known.group for known in self._known]
+        iou = np.zeros(meet.shape)
+        for i, j in np.argwhere(meet & groups).tolist():
+            iou[i, j] = overlap(places[i], self._known[j])
+        return iou
+
+
+def _box(place: Place) -> NDArray[np.float64]:
+    """(2, 2) lowest and highest x, y; an outline without area meets nothing."""
+    if len(place.footprint) < 3:
+        return np.array([[np.inf, np.inf], [-np.inf, -np.inf]])
+    return np.array([place.footprint.min(axis=0), place.footprint.max(axis=0)], float)
+
 
 def overlap(a: Place, b: Place) -> float:
     """Intersection over union of two footprints, 0..1; 0 across groups and for outlines without area."""
     if a.group != b.group or len(a.footprint) < 3 or len(b.footprint) < 3:
         return 0.0
-    low = np.minimum(a.footprint.min(axis=0), b.footprint.min(axis=0))
-    high = np.maximum(a.footprint.max(axis=0), b.footprint.max(axis=0))
-    if (
-        np.maximum(a.footprint.min(axis=0), b.footprint.min(axis=0))
-        >= np.minimum(a.footprint.max(axis=0), b.footprint.max(axis=0))
-    ).any():
+    corners = np.array([_box(a), _box(b)])
+    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    if (corners[:, 0].max(axis=0) >= corners[:, 1].min(axis=0)).any():
         return 0.0
     columns, rows = (np.ceil((high - low) / RASTER_M).astype(int) + 1).tolist()
     masks = []

@@ -1,10 +1,10 @@
 """Rooms of one floor from the walls seen from above.
 
 Source: paper, room layer (bird's-eye view, min-max, threshold, walls, distance field, Otsu seeds, watershed), with
-HOV-SG's working values. Departs: a cell weighs by how much of the wall slice's height is occupied, not by its number of
-points; rooms are limited to what was observed (rays and points); seeds are the maxima of the distance field that a
-doorway parts, since Otsu's one threshold hides a narrow corridor beside a hall; flooding follows the distance field
-level by level, since cv2.watershed orders pixels by steps of colour instead.
+HOV-SG's working values. Departs: a wall is what fills a little of the slice's height in a piece of some length, so that
+the lintel of a door or archway parts rooms, however few points it has; rooms are limited to what was observed (rays and
+points); seeds are the maxima of the distance field that a doorway parts, since Otsu's one threshold hides a narrow
+corridor beside a hall.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from placegraph.nodes.hierarchy.flood import Neck, flood
 from placegraph.nodes.hierarchy.floors import FloorSpan
 
 Bool = NDArray[np.bool_]
@@ -30,18 +31,18 @@ class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 
     cell_m: float = 0.05  # HOV-SG
     slice_low_m: float = 1.5  # above the floor, HOV-SG
-    slice_high_m: float = 0.3  # below the ceiling, HOV-SG
+    slice_high_m: float = 0.1  # below the ceiling; departs: HOV-SG's .3 cuts the lintels that a low camera sees
     least_slice_m: float = 0.3  # departs: a scan that shows less than this of the slice has walls from lower down
     partial_low_m: float = 1.0  # ... namely from here: over tables and the backs of chairs
     level_m: float = 0.1  # a wall counts by the levels of this height that it fills
-    wall_share: float = 0.25  # of the maximum, HOV-SG
+    wall_fill_m: float = 0.2  # departs: of the slice; HOV-SG's .25 of the fullest cell has no room for a lintel
     smooth_m: float = 0.1  # of the distance field, departs: HOV-SG smooths over .5 m, which closes corridors
     seed_min_m: float = 0.5  # HOV-SG: drop seeds under .5 m across
     door_m: float = 1.6  # departs: openings up to this wide part rooms; best of 1.2, 1.4, 1.6 on 8 real maps (ipa)
     neck_share: float = 0.7  # departs: ... if they are this much narrower than the smaller room
     close_m: float = 0.3  # gaps in what was observed that are closed
     room_min_m2: float = 1.0
-    wall_min_m: float = 1.0  # less wall than this in all parts no rooms; in a plan, shorter pieces are furniture
+    wall_min_m: float = 1.0  # shorter pieces are furniture and lamps; less wall than this in all parts no rooms
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,13 +118,16 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomCon
     tall = (above >= low) & (above <= high)
     rows, columns = grid.cells(points_world[tall])
     levels = np.floor((above[tall] - low) / config.level_m).astype(np.int64)
-    filled = np.unique((levels * grid.shape[0] + rows) * grid.shape[1] + columns) % (grid.shape[0] * grid.shape[1])
-    density = np.bincount(filled, minlength=grid.shape[0] * grid.shape[1]).reshape(grid.shape).astype(np.float32)
-    if density.max() == 0:
-        return np.zeros(grid.shape, bool)
-    density = cv2.GaussianBlur(density / density.max(), (3, 3), 0)
-    walls = (density > config.wall_share * density.max()).astype(np.uint8)
-    return cv2.morphologyEx(walls, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)).astype(bool)
+    kernel = np.ones((3, 3), np.uint8)
+    filled = np.zeros(grid.shape, np.uint8)  # a cell's number of levels
+    for level in range(int(levels.max(initial=-1)) + 1):
+        here, seen = levels == level, np.zeros(grid.shape, np.uint8)
+        seen[rows[here], columns[here]] = 1
+        # a wall seen from a few places has holes: a cell's neighbours stand in for it, and the erosion takes it back
+        filled += np.asarray(cv2.dilate(seen, kernel), np.uint8)
+    walls = (filled >= round(config.wall_fill_m / config.level_m)).astype(np.uint8)
+    walls = cv2.erode(cv2.morphologyEx(walls, cv2.MORPH_CLOSE, kernel), kernel)
+    return walls_of_plan(np.asarray(walls, bool), config)
 
 
 def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid: Grid, config: RoomConfig) -> Bool:
@@ -140,7 +144,7 @@ def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid:
 
 
 def walls_of_plan(occupied: Bool, config: RoomConfig) -> Bool:
-    """Walls of a plan without heights: its occupied pieces of `wall_min_m` or more; shorter ones are furniture.
+    """Walls: what is occupied in pieces of `wall_min_m` or more; shorter ones are furniture and lamps.
 
     Source: ours, measured on the ipa maps (README, "Results").
     """
@@ -158,93 +162,16 @@ def segment_rooms(walls: Bool, observed: Bool, config: RoomConfig) -> I32:
         return observed.astype(np.int32)
     field = distance_field(walls, config)
     field[~open_space] = 0
-    return flood(field, open_space, config)
+    labels = flood(field, open_space, config.cell_m, config.seed_min_m / 2, lambda neck: _is_door(neck, config))
+    return labels if labels.any() else open_space.astype(np.int32)  # all of it is narrower than a seed
+
+
+def _is_door(neck: Neck, config: RoomConfig) -> bool:
+    """A neck at most as wide as a door and narrower than what lies on either side parts rooms."""
+    return 2 * neck.level <= config.door_m and neck.level <= config.neck_share * min(neck.heights)
 
 
 def distance_field(walls: Bool, config: RoomConfig) -> F32:
     """Metres to the nearest wall, lightly smoothed. Source: paper, room layer (EDF)."""
     field = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * config.cell_m
     return np.asarray(cv2.GaussianBlur(field, (0, 0), config.smooth_m / config.cell_m), np.float32)
-
-
-def flood(field: F32, space: Bool, config: RoomConfig) -> I32:
-    """Watershed of a distance field (metres) inside `space`, from the highest level down.
-
-    Every maximum is a seed; where two basins meet, the level is half the width of the neck between them, and they are
-    one room unless it is as narrow as a door and narrower than either. Returns labels 1..n, 0 elsewhere.
-    """
-    labels = np.zeros(field.shape, np.int32)
-    heights: dict[int, float] = {}  # distance field at the seed of each basin
-    parted: set[tuple[int, int]] = set()
-    levels = np.arange(float(field.max()), config.seed_min_m / 2, -config.cell_m).tolist()
-    for level in levels:
-        mask = space & (field >= level)
-        for new in _unlabelled_parts(mask, labels):
-            number = len(heights) + 1
-            heights[number] = level
-            labels[new] = number
-        _grow(labels, mask)
-        _join_basins(labels, heights, parted, level, config)
-    _grow(labels, space)
-    found, numbers = np.unique(labels[labels > 0], return_inverse=True)
-    if not len(found):  # all of it is narrower than a seed
-        return space.astype(np.int32)
-    labels[labels > 0] = numbers + 1
-    return labels
-
-
-def _unlabelled_parts(mask: Bool, labels: I32) -> list[tuple[NDArray[np.int64], ...]]:
-    _, parts = cv2.connectedComponents(mask.view(np.uint8), connectivity=4)
-    known = np.zeros(int(parts.max()) + 1, bool)
-    known[parts[labels > 0]] = True
-    known[0] = True
-    return [np.nonzero(parts == part) for part in np.flatnonzero(~known)]
-
-
-def _grow(labels: I32, mask: Bool) -> None:
-    """Let basins grow into the free cells of a mask, one ring at a time; the later basin wins a tie."""
-    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-    rest = mask & (labels == 0)
-    while rest.any():
-        spread = cv2.dilate(labels.astype(np.float32), cross).astype(np.int32)  # dilation knows no int32
-        reached = rest & (spread > 0)
-        if not reached.any():
-            return
-        labels[reached] = spread[reached]
-        rest &= ~reached
-
-
-def _join_basins(
-    labels: I32, heights: dict[int, float], parted: set[tuple[int, int]], level: float, config: RoomConfig
-) -> None:
-    heir: dict[int, int] = {}
-    for pair in _touching(labels):
-        a, b = (_last_heir(heir, number) for number in pair)
-        if a == b or (min(a, b), max(a, b)) in parted:
-            continue
-        if 2 * level <= config.door_m and level <= config.neck_share * min(heights[a], heights[b]):
-            parted.add((min(a, b), max(a, b)))
-            continue
-        kept, gone = (a, b) if heights[a] >= heights[b] else (b, a)
-        heir[gone] = kept
-        for old in [pair for pair in parted if gone in pair]:
-            parted.discard(old)
-            other = old[0] if old[1] == gone else old[1]
-            parted.add((min(kept, other), max(kept, other)))
-    if heir:
-        table = np.array([0, *(_last_heir(heir, number) for number in heights)], np.int32)
-        labels[:] = table[labels]
-
-
-def _last_heir(heir: dict[int, int], number: int) -> int:
-    while number in heir:
-        number = heir[number]
-    return number
-
-
-def _touching(labels: I32) -> list[tuple[int, int]]:
-    found: set[tuple[int, int]] = set()
-    for a, b in ((labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])):
-        meet = (a != b) & (a > 0) & (b > 0)
-        found |= set(zip(np.minimum(a[meet], b[meet]).tolist(), np.maximum(a[meet], b[meet]).tolist(), strict=True))
-    return sorted(found)

@@ -7,7 +7,6 @@ from placegraph.nodes.hierarchy.rooms import (
     RoomConfig,
     distance_field,
     find_rooms,
-    flood,
     floor_grid,
     observed_mask,
     segment_rooms,
@@ -114,9 +113,9 @@ def test_unseen_cells_and_walls_have_no_label():
 
 
 def test_space_too_narrow_for_a_seed_is_still_a_room():
-    space = np.zeros((40, 40), bool)
-    space[10:13] = True
-    assert (flood(np.where(space, 0.05, 0).astype(np.float32), space, CONFIG) == space).all()
+    walls = np.ones((40, 40), bool)
+    walls[10:13] = False
+    assert (segment_rooms(walls, np.ones_like(walls), CONFIG) == ~walls).all()
 
 
 def test_distance_field_is_in_metres():
@@ -126,11 +125,22 @@ def test_distance_field_is_in_metres():
 
 
 def test_walls_are_what_fills_the_slice_not_what_has_many_points():
-    grid = Grid(np.zeros(2), 0.05, (40, 40))
-    wall = np.array([[0.525, 0.525, z] for z in np.arange(0, 2.6, 0.05)])
-    lamp = np.tile([[1.525, 1.525, 1.8]], (500, 1))
-    found = wall_mask(np.concatenate((wall, lamp)), SPAN, grid, CONFIG)
-    assert found[10, 10] and not found[30, 30]
+    grid = Grid(np.zeros(2), 0.05, (60, 60))
+    y, z = (side.ravel() for side in np.meshgrid(np.arange(0.5, 2, 0.05), np.arange(0, 2.6, 0.05)))
+    wall = np.stack((np.full(y.size, 0.525), y, z), axis=1)
+    shelf = np.repeat(np.stack((np.full(30, 1.525), np.arange(0.5, 2, 0.05), np.full(30, 1.85)), axis=1), 50, axis=0)
+    found = wall_mask(np.concatenate((wall, shelf)), SPAN, grid, CONFIG)
+    assert found[20, 10] and not found[:, 20:].any()
+
+
+@pytest.mark.parametrize(("width", "rooms"), [(0.5, 1), (3.0, 2)])
+def test_a_lintel_parts_rooms_and_a_lamp_as_high_does_not(width, rooms):
+    ground = [[x, y, 0.0] for x in np.arange(0.025, 6, 0.05) for y in np.arange(0.025, 3, 0.05)]
+    walls = [[x, y, z] for z in np.arange(0, 2.6, 0.05) for x in np.arange(0.025, 6, 0.05) for y in (0.025, 2.975)]
+    walls += [[x, y, z] for z in np.arange(0, 2.6, 0.05) for y in np.arange(0.025, 3, 0.05) for x in (0.025, 5.975)]
+    ys = 1.5 + np.arange(-width / 2 + 0.025, width / 2, 0.05)
+    hanging = [[x, y, z] for x in (2.975, 3.025) for y in ys for z in (2.1, 2.15, 2.2)]
+    assert len(rooms_of(ground + walls + hanging)[1]) == rooms
 
 
 def test_no_tall_points_no_walls():
@@ -156,7 +166,7 @@ def test_outline_of_a_rectangle_is_exact():
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_walls_of_a_plan_are_its_long_pieces(count: int) -> None:
+def test_walls_of_a_plan_are_its_walls_of_plan(count: int) -> None:
     occupied = np.zeros((60, 60), bool)
     assert not walls_of_plan(occupied, CONFIG).any()
     occupied[5, 5 : 5 + 40 * count] = True  # two metres of wall
