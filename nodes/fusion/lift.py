@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from placegraph.nodes.fusion.clusters import largest_cluster
-from placegraph.nodes.fusion.voxels import pack, sum_by_key
+from placegraph.nodes.fusion.cells import pack, sum_by_key
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.geometry import bounding_box, transform
 from placegraph.runtime.messages import Keyframe, Segments
