@@ -62,8 +62,8 @@ def block_of(keys: I64) -> I64:
 class CellIndex:
     """Which row belongs to a cell; rows are counted from 0 in the order in which cells first came.
 
-    Cells are kept by blocks of 32 cells each way, sorted within: looking up costs what the blocks in view hold, whatever
-    else there is, and 12 bytes a cell.
+    Cells are kept by blocks of 32 cells each way, sorted within: looking up costs what the blocks in view hold,
+    whatever else there is, and 12 bytes a cell.
     """
 
     def __init__(self, cell_m: F64) -> None:

@@ -32,8 +32,10 @@ class Cloud:
 
     def __init__(self, keys: I64, values: F64, submap: int, ground: Ground) -> None:
         self.keys, self.values = keys, values
-        self.seen_through: U8 = np.zeros(len(keys), np.uint8)  # in how many keyframes since it was last confirmed
+        self.seen_through: U8 = np.zeros(len(keys), np.uint8)  # keyframes, less those that saw it
+        self.shown: F64 = np.zeros(len(keys))  # views of the object that saw the voxel, whatever their masks held
         self._ground = ground
+        self._placed_by: dict[int, F64] = {}  # poses of the parts at the last `place_again`
         self._parts: dict[int, tuple[I64, F64]] = {}  # as they were when they were fused
         self._keep(submap, keys, values)
 
@@ -45,6 +47,8 @@ class Cloud:
     def absorb(self, other: Cloud) -> None:
         """Add all of another cloud."""
         self._sum(other.keys, other.values)
+        self.shown[np.searchsorted(self.keys, other.keys)] += other.shown
+        self._placed_by.update(other._placed_by)
         for submap, (keys, values) in other._parts.items():
             self._keep(submap, keys, values)
 
@@ -52,27 +56,50 @@ class Cloud:
         """Whether some of its points came with one of these submaps."""
         return any(submap in submaps for submap in self._parts)
 
+    def show(self, keys: I64) -> None:
+        """A view of the object saw these voxels."""
+        if len(keys):
+            at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+            self.shown[at[self.keys[at] == keys]] += 1
+
+    def claimed(self) -> F64:
+        """(N,) share of the views that saw a voxel whose masks held it."""
+        views = self.values[:, 7]
+        return np.asarray(views / np.maximum(views, self.shown))
+
     def place_again(self) -> None:
         """Make the voxels anew from the parts, after submaps have moved."""
-        placed = [self._placed(submap) for submap in sorted(self._parts)]
-        self.keys, self.values = sum_by_key(*(np.concatenate(column) for column in zip(*placed, strict=True)))
+        known, claimed = self.keys, self.claimed()
+        placed = []
+        for submap in sorted(self._parts):
+            before = np.minimum(
+                np.searchsorted(known, self._keys_at(submap, self._placed_by.get(submap))), len(known) - 1
+            )
+            keys, values = self._parts[submap]
+            shown = values[:, 7] / claimed[before]
+            placed.append(self._moved(keys, np.column_stack((values, shown)), self._pose(submap)))
+            self._placed_by[submap] = self._pose(submap)
+        self.keys, values = sum_by_key(*(np.concatenate(column) for column in zip(*placed, strict=True)))
+        self.values, self.shown = values[:, :8], values[:, 8]
         self.seen_through = np.zeros(len(self.keys), np.uint8)
 
     def remove(self, gone: Bool) -> None:
         """Drop voxels (N,)."""
         keys = self.keys[gone]
-        self.keys, self.values, self.seen_through = self.keys[~gone], self.values[~gone], self.seen_through[~gone]
+        for name in ("keys", "values", "seen_through", "shown"):
+            setattr(self, name, getattr(self, name)[~gone])
         for submap, (fused, values) in list(self._parts.items()):
-            kept = ~np.isin(self._keys_now(submap), keys)
+            kept = ~np.isin(self._keys_at(submap, self._pose(submap)), keys)
             self._parts[submap] = fused[kept], values[kept]
             if not kept.any():
                 del self._parts[submap]
 
     def _sum(self, keys: I64, values: F64) -> None:
-        before, counts = self.keys, self.seen_through
+        before, counts, shown = self.keys, self.seen_through, self.shown
         self.keys, self.values = sum_by_key(np.r_[before, keys], np.r_[self.values, values])
-        self.seen_through = np.zeros(len(self.keys), np.uint8)
-        self.seen_through[np.searchsorted(self.keys, before)] = counts
+        self.seen_through, self.shown = np.zeros(len(self.keys), np.uint8), np.zeros(len(self.keys))
+        at = np.searchsorted(self.keys, before)
+        self.seen_through[at], self.shown[at] = counts, shown
         self.seen_through[np.searchsorted(self.keys, keys)] = 0
 
     def _keep(self, submap: int, keys: I64, values: F64) -> None:
@@ -100,10 +127,9 @@ class Cloud:
     def _placed(self, submap: int) -> tuple[I64, F64]:
         return self._moved(*self._parts[submap], self._pose(submap))
 
-    def _keys_now(self, submap: int) -> I64:
+    def _keys_at(self, submap: int, pose: F64 | None) -> I64:
         keys, values = self._parts[submap]
-        pose = self._pose(submap)
-        if np.array_equal(pose, np.eye(4)):
+        if pose is None or np.array_equal(pose, np.eye(4)):
             return keys
         return pack(transform(pose, values[:, :3] / values[:, 6:7]), self._ground.voxel_m)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,20 +12,17 @@ from placegraph.nodes.fusion.lift import LiftConfig
 from placegraph.nodes.fusion.objects import ObjectMap
 
 
-def object_fields(objects: ObjectMap, lift: LiftConfig, min_observations: int) -> dict[str, Any]:
-    """The fields of all objects that were seen often enough, by id."""
-    gone = [one for _, one in sorted(objects.retired.items()) if one.instance.observations >= min_observations]
-    return _present(_stable(objects.instances.values(), min_observations), lift) | {
+def object_fields(objects: ObjectMap, is_stable: Callable[[Instance], bool], lift: LiftConfig) -> dict[str, Any]:
+    """The fields of all objects that are believed in, by id."""
+    gone = [one for _, one in sorted(objects.retired.items()) if is_stable(one.instance)]
+    present = [one for _, one in sorted(objects.instances.items()) if is_stable(one)]
+    return _present(present, lift) | {
         "retired_ids": np.array([one.instance.number for one in gone], np.int64),
         "retired_boxes_world": np.array([_solid(one.instance, lift).box for one in gone], np.float32).reshape(-1, 2, 3),
         "retired_last_frames": np.array([one.instance.last_frame for one in gone], np.int64),
         "retired_gone_frames": np.array([one.gone_frame for one in gone], np.int64),
         **{f"retired_{name}": value for name, value in _tags([one.instance for one in gone]).items()},
     }
-
-
-def _stable(instances: Iterable[Instance], min_observations: int) -> list[Instance]:
-    return sorted((one for one in instances if one.observations >= min_observations), key=lambda one: one.number)
 
 
 def _solid(instance: Instance, lift: LiftConfig) -> Solid:

@@ -2,8 +2,9 @@
 
 Sums of whole numbers are exact, so what a submap gave can be taken away and given again elsewhere without a trace, and
 the order of additions does not matter.
-Source: re-integration of submaps after loop closure as in Voxgraph and Cartographer. Departs: cells are moved as points,
-not as distances, and a cell keeps the contributions of a few submaps only, which bounds the memory by the map's size.
+Source: re-integration of submaps after loop closure as in Voxgraph and Cartographer. Departs: cells are moved as
+points, not as distances, and a cell keeps the contributions of a few submaps only, which bounds the memory by the map's
+size.
 """
 
 from __future__ import annotations

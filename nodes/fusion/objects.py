@@ -37,6 +37,9 @@ class AssociationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     unlike_overlap: float = 0.5  # departs: in both directions, when the names differ
     merge_overlap: float = 0.5  # BBQ: .7
     merge_unlike_overlap: float = 0.6
+    # departs: two sides of a pole or a board share no point; most of each is this near to the other
+    sides_m: float = 0.12
+    sides_share: float = 0.8  # of the one; of the other, which may be seen in full, `overlap`
     merge_every: int = 10  # keyframes; BBQ: 20
     prune_after: int = 20  # keyframes without a second view; ConceptGraphs drops what has fewer than 3 views
 
@@ -190,21 +193,30 @@ class ObjectMap:
     def _double_of(self, number: int) -> int | None:
         c, instance = self._config, self.instances[number]
         best: tuple[float, int] | None = None
-        for other in self._grid.near(instance.box, self._reach_m):
+        reach_m = max(self._reach_m, c.sides_m)
+        for other in self._grid.near(instance.box, reach_m):
             candidate = self.instances[other]
-            if other == number or not boxes_meet(instance.box, candidate.box, self._reach_m):
+            if other == number or not boxes_meet(instance.box, candidate.box, reach_m):
                 continue
             forward, backward = self._shares(instance.points, instance.tree, candidate)
             cosine = self._cosine(instance.votes, candidate.votes)
             most = max(forward, backward)
-            apart = self._apart.get((min(number, other), max(number, other)), 0) >= 2
+            apart = self._apart.get((min(number, other), max(number, other)), 0)
             fits = min(forward, backward) >= c.merge_unlike_overlap
-            if cosine >= c.same_cosine and not apart:
+            if cosine >= c.same_cosine and apart < 2:
                 within = inside(instance.box, candidate.box, self._reach_m)
                 fits |= most >= c.merge_overlap or (within >= c.box_inside and most >= c.box_overlap)
+                fits |= not apart and self._are_sides(instance, candidate)
             if fits and (best is None or most > best[0]):
                 best = (most, other)
         return None if best is None else best[1]
+
+    def _are_sides(self, one: Instance, other: Instance) -> bool:
+        """Whether two clouds lie along each other, as those of a thin thing's two sides do."""
+        c = self._config
+        pairs = ((one.points, other.tree), (other.points, one.tree))
+        less, most = sorted(share_near(points, tree, c.sides_m) for points, tree in pairs)
+        return most >= c.sides_share and less >= c.overlap
 
     def _shares(self, points: NDArray[np.float64], tree: cKDTree | None, known: Instance) -> tuple[float, float]:
         # share of `points` near the known object's, and the other way round, looking only where they can meet

@@ -33,10 +33,10 @@ class SightConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 class Sight:
     """One keyframe's depth, ready to judge points."""
 
-    def __init__(self, depth_m: F32, intrinsics: F64, world_from_camera: F64, config: SightConfig) -> None:
-        """depth_m: (H, W) metres, 0 = no reading; intrinsics: (4,) fx fy cx cy in px."""
+    def __init__(self, depth_m: F32, edges: Bool, intrinsics: F64, world_from_camera: F64, config: SightConfig) -> None:
+        """depth_m: (H, W) metres, 0 = no reading; edges: (H, W), not believed; intrinsics: (4,) fx fy cx cy in px."""
         self.config = config
-        self._depth_m = depth_m
+        self._depth_m = np.where(edges, np.float32(0), depth_m)
         kernel = np.ones((2 * config.around_px + 1,) * 2, np.uint8)
         self._nearest_m = cv2.erode(np.where(depth_m > 0, depth_m, np.float32(np.inf)), kernel)
         self._intrinsics = intrinsics

@@ -47,7 +47,7 @@ class VoxelMap(Layer):
         self.voxel_m = voxel_m
         self._xyz: F32 = np.zeros((1024, 3), np.float32)  # as `points` gives them
         self._rgb: U8 = np.zeros((1024, 3), np.uint8)
-        self._seen_through = np.zeros(1024, np.uint8)  # in how many keyframes since it was last confirmed
+        self._seen_through = np.zeros(1024, np.uint8)  # keyframes, less those that saw it
 
     def fuse(self, xyz_world: Points, colors: U8, submap: int = 0) -> None:
         """Add points (N, 3) in metres with colours (N, 3). Raises SchemaError for points that are not finite."""
@@ -58,13 +58,18 @@ class VoxelMap(Layer):
         self.add(*sum_by_key(keys, np.concatenate((steps, colors.astype(np.int32), ones), axis=1)), submap)
 
     def look(self, sight: Sight) -> None:
-        """Remove what has been seen through in so many keyframes without being seen in between."""
+        """Remove what so many keyframes more have seen through than seen."""
         rows = np.asarray(sight.rows_in_view(self.index), np.int64)
         rows = rows[self.sums[rows, -1] > 0]
         through, there = sight.judge(self._xyz[rows])
         self._seen_through[rows[through]] += 1
-        self._seen_through[rows[there]] = 0
+        self._seen_through[rows[there & (self._seen_through[rows] > 0)]] -= 1
         self.remove(rows[self._seen_through[rows] >= sight.config.views])
+
+    def remove(self, rows: I64) -> None:
+        """Take voxels out of the map; seen again, they start anew."""
+        super().remove(rows)
+        self._seen_through[rows] = 0
 
     def points(self) -> F32:
         """Centroids (P, 3), metres, world frame, oldest voxel first."""
@@ -84,7 +89,6 @@ class VoxelMap(Layer):
 
     def changed(self, rows: I64) -> None:
         """Keep positions and colours ready, so that giving the map copies them and computes nothing."""
-        self._seen_through[rows] = 0
         rows = rows[self.sums[rows, 6] > 0]
         sums = self.sums[rows]
         self._xyz[rows] = self._centroids(self.keys[rows], sums)

@@ -1,8 +1,8 @@
 import numpy as np
 
+from placegraph.nodes.fusion.cells import pack, sum_by_key
 from placegraph.nodes.fusion.instance import Instance
 from placegraph.nodes.fusion.lift import Observation
-from placegraph.nodes.fusion.cells import pack, sum_by_key
 from placegraph.runtime.geometry import bounding_box
 
 

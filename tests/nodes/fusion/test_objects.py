@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from placegraph.nodes.fusion.cells import pack, sum_by_key
 from placegraph.nodes.fusion.cloud import Ground
 from placegraph.nodes.fusion.lift import Observation
 from placegraph.nodes.fusion.objects import AssociationConfig, Moment, ObjectMap
-from placegraph.nodes.fusion.cells import pack, sum_by_key
 from placegraph.runtime.geometry import bounding_box
 
 NAMES = ["chair", "table", "cup", "couch", "sofa", "bed"]
