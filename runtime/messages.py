@@ -151,6 +151,13 @@ class Map(Message):
     tag_names: tuple[str, ...]  # tags of object 0, then of object 1, ...; strongest first within an object
     tag_votes: F32 = array("float32", ("T",), unit="1")  # summed detection scores over views
     tag_offsets: I64 = array("int64", ("N+1",), unit="1")
+    retired_ids: I64 = array("int64", ("R",), unit="1")  # objects that were seen to be no longer there, ascending
+    retired_boxes_world: F32 = array("float32", ("R", 2, 3), unit="m", frame="world")  # where they were
+    retired_last_frames: I64 = array("int64", ("R",), unit="1")  # that showed them
+    retired_gone_frames: I64 = array("int64", ("R",), unit="1")  # that made it certain
+    retired_tag_names: tuple[str, ...]  # as tag_names
+    retired_tag_votes: F32 = array("float32", ("U",), unit="1")
+    retired_tag_offsets: I64 = array("int64", ("R+1",), unit="1")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -49,9 +49,10 @@ def _number_by_first(labels: I64) -> I64:
     return out
 
 
-def largest_cluster(points: Points, eps: float, min_points: int) -> I64:
-    """Indices of the points of the largest cluster, empty when all are noise; the first one wins a tie."""
+def main_clusters(points: Points, eps: float, min_points: int, share: float) -> I64:
+    """Indices of the points of all clusters with at least `share` of the largest one's, empty when all are noise."""
     labels = dbscan(points, eps, min_points)
     if not (labels >= 0).any():
         return np.zeros(0, np.int64)
-    return np.flatnonzero(labels == np.argmax(np.bincount(labels[labels >= 0])))
+    sizes = np.bincount(labels[labels >= 0])
+    return np.flatnonzero((labels >= 0) & (sizes >= share * sizes.max())[labels])

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from placegraph.nodes.fusion.clusters import largest_cluster
-from placegraph.nodes.fusion.voxels import pack, sum_by_key
+from placegraph.nodes.fusion.cells import pack, sum_by_key
+from placegraph.nodes.fusion.clusters import main_clusters
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.geometry import bounding_box, transform
 from placegraph.runtime.messages import Keyframe, Segments
@@ -33,6 +33,10 @@ class LiftConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     max_depth_m: float = 5.0  # departs: stereo and structured light err by more than a cup beyond
     cluster_eps_m: float = 0.075  # ConceptGraphs: .05-.1
     cluster_min_points: int = 10  # ConceptGraphs
+    # departs: the peers keep the largest cluster, which loses the legs of chairs, the poles of lamps, and one half of
+    # whatever something stands before; what leaks onto the background goes by `claimed_share`
+    cluster_share: float = 0.15
+    depth_gap_m: float = 0.5  # departs: further from the depth of most of a mask, it is another surface
     min_points: int = 8  # departs: a cup 4 m away still leaves about ten voxels
     erode_share: float = 0.03  # departs: of the mask's shorter side, at least one pixel
     erode_max_px: int = 4
@@ -124,7 +128,17 @@ def _lift_mask(
     values[:, 7] = 1
     # a handful of voxels cannot have ten neighbours each
     min_points = min(config.cluster_min_points, max(3, len(keys) // 3))
-    cluster = largest_cluster(values[:, :3] / values[:, 6:7], config.cluster_eps_m, min_points)
+    points = values[:, :3] / values[:, 6:7]
+    cluster = main_clusters(points, config.cluster_eps_m, min_points, config.cluster_share)
+    cluster = cluster[_about_as_deep(points[cluster], keyframe.world_from_camera, config)]
     if len(cluster) < config.min_points:
         return None
     return keys[cluster], values[cluster]
+
+
+def _about_as_deep(points: F64, world_from_camera: F64, config: LiftConfig) -> Bool:
+    """Which points (N, 3) are no further behind or before the most of them than a thing may reach."""
+    depth = (points - world_from_camera[:3, 3]) @ world_from_camera[:3, 2]
+    middle = float(np.median(depth)) if len(depth) else 0.0
+    spread = float(np.median(np.abs(depth - middle))) if len(depth) else 0.0
+    return np.asarray(np.abs(depth - middle) <= config.depth_gap_m + 3 * spread)

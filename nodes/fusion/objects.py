@@ -7,17 +7,22 @@ that a table does not swallow the cup on it; two things seen side by side in one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 from scipy.spatial import cKDTree
 
+from placegraph.nodes.fusion.cloud import Ground
+from placegraph.nodes.fusion.grid import Grid, boxes_meet, inside, share_near
 from placegraph.nodes.fusion.instance import Instance
 from placegraph.nodes.fusion.lift import Observation
+from placegraph.nodes.fusion.sight import Sight
 
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 Encode = Callable[[Sequence[str]], F32]  # names to (N, D) unit rows
 
 
@@ -32,26 +37,46 @@ class AssociationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     unlike_overlap: float = 0.5  # departs: in both directions, when the names differ
     merge_overlap: float = 0.5  # BBQ: .7
     merge_unlike_overlap: float = 0.6
+    # departs: two sides of a pole or a board share no point; most of each is this near to the other
+    sides_m: float = 0.12
+    sides_share: float = 0.8  # of the one; of the other, which may be seen in full, `overlap`
     merge_every: int = 10  # keyframes; BBQ: 20
     prune_after: int = 20  # keyframes without a second view; ConceptGraphs drops what has fewer than 3 views
+
+
+class Moment(NamedTuple):
+    """When something was seen: the keyframe, counted from 0 over the run, its frame id and its submap."""
+
+    keyframe: int
+    frame_id: int
+    submap: int = 0
+
+
+class Retired(NamedTuple):
+    """An object that is no longer where it was, and the frame that made it certain."""
+
+    instance: Instance
+    gone_frame: int
 
 
 class ObjectMap:
     """All objects of a run by number, with a grid over the plan that finds neighbours."""
 
-    def __init__(self, encode: Encode, voxel_m: float, config: AssociationConfig) -> None:
+    def __init__(self, encode: Encode, ground: Ground, config: AssociationConfig) -> None:
         self.instances: dict[int, Instance] = {}
+        self.retired: dict[int, Retired] = {}
         self._encode = encode
         self._config = config
-        self._reach_m = config.reach_voxels * voxel_m
+        self._ground = ground
+        self._reach_m = config.reach_voxels * ground.voxel_m
         self._next = 0
         self._vectors: dict[str, F32] = {}
-        self._grid = _Grid()
+        self._grid = Grid()
         self._apart: dict[tuple[int, int], int] = {}  # views that showed both as separate things
         self._checked: dict[int, int] = {}  # the revision at which an instance was last compared for merging
 
-    def add(self, seen: Sequence[Observation], keyframe: int, frame_id: int) -> None:
-        """Take all that keyframe number `keyframe` shows; strongest first. Merges and prunes every `merge_every`."""
+    def add(self, seen: Sequence[Observation], moment: Moment) -> None:
+        """Take all that a keyframe shows; strongest first. Merges and prunes every `merge_every`."""
         taken: dict[int, list[Observation]] = {}
         self._remember_vectors(observation.name for observation in seen)
         for observation in seen:
@@ -59,14 +84,58 @@ class ObjectMap:
             if number is None:
                 number = self._next
                 self._next += 1
-                self.instances[number] = Instance(number, observation, keyframe, frame_id)
+                self.instances[number] = Instance(number, observation, *moment, self._ground)
             else:
-                self.instances[number].update(observation, keyframe, frame_id)
+                self.instances[number].update(observation, *moment)
             taken.setdefault(number, []).append(observation)
             self._grid.put(number, self.instances[number].box)
         self._note_apart(list(taken))
-        if (keyframe + 1) % self._config.merge_every == 0:
-            self.tidy(keyframe)
+        if (moment.keyframe + 1) % self._config.merge_every == 0:
+            self.tidy(moment.keyframe)
+
+    def look(self, sight: Sight) -> None:
+        """Take what a depth image says of the objects in its view; call it before `add` of the same keyframe."""
+        for number in self._grid.near(sight.box, 0.0):
+            instance = self.instances[number]
+            if sight.box_in_view(instance.box):
+                instance.look(*sight.judge(instance.points), sight.config)
+                self._grid.put(number, instance.box)
+
+    def retire(self, views: int, frame_id: int) -> None:
+        """Objects that so many keyframes have seen through since they were last seen are no longer there."""
+        for number in [n for n, instance in self.instances.items() if instance.absences >= views]:
+            self.retired[number] = Retired(self.instances[number], frame_id)
+            self._forget(number, None)
+
+    def move(self, moves: Mapping[int, F64], keyframe: int) -> None:
+        """Follow submaps that have moved; what now coincides becomes one, also with what was given up for gone."""
+        for instance in self.instances.values():
+            if instance.cloud.is_of(moves):
+                instance.follow()
+                self._grid.put(instance.number, instance.box)
+        for number, (instance, _) in list(self.retired.items()):
+            if instance.cloud.is_of(moves):
+                instance.follow()
+                self._revive(number)
+        self.tidy(keyframe)
+
+    def _revive(self, number: int) -> None:
+        """An object that was only looked for in the wrong place is the one that was then found in the right place."""
+        instance = self.retired[number].instance
+        self.instances[number] = instance
+        if (partner := self._double_of(number)) is None:
+            del self.instances[number]
+            return
+        del self.retired[number]
+        self._grid.put(number, instance.box)
+        self._merge(number, partner)
+
+    def _merge(self, a: int, b: int) -> int:
+        kept, gone = sorted((a, b))
+        self.instances[kept].absorb(self.instances[gone])
+        self._grid.put(kept, self.instances[kept].box)
+        self._forget(gone, kept)
+        return kept
 
     def tidy(self, keyframe: int) -> None:
         """Merge doubles until none is left, then prune what one view alone showed long ago."""
@@ -79,11 +148,9 @@ class ObjectMap:
             if partner is None:
                 self._checked[number] = self.instances[number].revision
                 continue
-            kept, gone = sorted((number, partner))
-            self.instances[kept].absorb(self.instances[gone])
-            self._grid.put(kept, self.instances[kept].box)
-            self._forget(gone, kept)
-            queue.append(kept)  # it has grown and may now meet a third; each round is one object fewer, so this ends
+            queue.append(
+                self._merge(number, partner)
+            )  # it has grown and may now meet a third; each round is one object fewer, so this ends
         for number in [n for n, instance in self.instances.items() if self._is_stale(instance, keyframe)]:
             self._forget(number, None)
 
@@ -106,19 +173,19 @@ class ObjectMap:
         best: tuple[float, int] | None = None
         for number in self._grid.near(seen.box, self._reach_m):
             instance = self.instances[number]
-            if not _boxes_meet(seen.box, instance.box, self._reach_m):
+            if not boxes_meet(seen.box, instance.box, self._reach_m):
                 continue
             forward, backward = self._shares(seen.points, None, instance)
             cosine = self._cosine({seen.name: 1.0}, instance.votes)
-            inside = _inside(seen.box, instance.box, self._reach_m)
+            within = inside(seen.box, instance.box, self._reach_m)
             most = max(forward, backward)
             if cosine >= c.same_cosine:
                 # a second mask of one view joins only what it lies in: two chairs of a view stay two
                 wanted = 2 * c.overlap if number in taken else c.overlap
-                fits = most >= wanted or (number not in taken and inside >= c.box_inside and most >= c.box_overlap)
+                fits = most >= wanted or (number not in taken and within >= c.box_inside and most >= c.box_overlap)
             else:
                 fits = min(forward, backward) >= c.unlike_overlap
-            score = most + inside + cosine
+            score = most + within + cosine
             if fits and (best is None or score > best[0]):
                 best = (score, number)
         return None if best is None else best[1]
@@ -126,30 +193,39 @@ class ObjectMap:
     def _double_of(self, number: int) -> int | None:
         c, instance = self._config, self.instances[number]
         best: tuple[float, int] | None = None
-        for other in self._grid.near(instance.box, self._reach_m):
+        reach_m = max(self._reach_m, c.sides_m)
+        for other in self._grid.near(instance.box, reach_m):
             candidate = self.instances[other]
-            if other == number or not _boxes_meet(instance.box, candidate.box, self._reach_m):
+            if other == number or not boxes_meet(instance.box, candidate.box, reach_m):
                 continue
             forward, backward = self._shares(instance.points, instance.tree, candidate)
             cosine = self._cosine(instance.votes, candidate.votes)
             most = max(forward, backward)
-            apart = self._apart.get((min(number, other), max(number, other)), 0) >= 2
+            apart = self._apart.get((min(number, other), max(number, other)), 0)
             fits = min(forward, backward) >= c.merge_unlike_overlap
-            if cosine >= c.same_cosine and not apart:
-                inside = _inside(instance.box, candidate.box, self._reach_m)
-                fits |= most >= c.merge_overlap or (inside >= c.box_inside and most >= c.box_overlap)
+            if cosine >= c.same_cosine and apart < 2:
+                within = inside(instance.box, candidate.box, self._reach_m)
+                fits |= most >= c.merge_overlap or (within >= c.box_inside and most >= c.box_overlap)
+                fits |= not apart and self._are_sides(instance, candidate)
             if fits and (best is None or most > best[0]):
                 best = (most, other)
         return None if best is None else best[1]
 
+    def _are_sides(self, one: Instance, other: Instance) -> bool:
+        """Whether two clouds lie along each other, as those of a thin thing's two sides do."""
+        c = self._config
+        pairs = ((one.points, other.tree), (other.points, one.tree))
+        less, most = sorted(share_near(points, tree, c.sides_m) for points, tree in pairs)
+        return most >= c.sides_share and less >= c.overlap
+
     def _shares(self, points: NDArray[np.float64], tree: cKDTree | None, known: Instance) -> tuple[float, float]:
         # share of `points` near the known object's, and the other way round, looking only where they can meet
-        forward = _share_near(points, known.tree, self._reach_m)
+        forward = share_near(points, known.tree, self._reach_m)
         if forward == 0:
             return 0.0, 0.0
         low, high = points.min(axis=0) - self._reach_m, points.max(axis=0) + self._reach_m
         meeting = known.points[((known.points >= low) & (known.points <= high)).all(axis=1)]
-        near = _share_near(meeting, tree if tree is not None else cKDTree(points), self._reach_m)
+        near = share_near(meeting, tree if tree is not None else cKDTree(points), self._reach_m)
         return forward, near * len(meeting) / len(known.points)
 
     def _remember_vectors(self, names: Iterable[str]) -> None:
@@ -169,55 +245,6 @@ class ObjectMap:
     def _note_apart(self, numbers: list[int]) -> None:
         for i, first in enumerate(numbers):
             for second in numbers[i + 1 :]:
-                if _boxes_meet(self.instances[first].box, self.instances[second].box, self._reach_m):
+                if boxes_meet(self.instances[first].box, self.instances[second].box, self._reach_m):
                     key = (min(first, second), max(first, second))
                     self._apart[key] = self._apart.get(key, 0) + 1
-
-
-class _Grid:
-    """Which objects may be near a box: numbers by plan cell of 1 m, so that a search does not visit them all."""
-
-    def __init__(self) -> None:
-        self._cells: dict[tuple[int, int], set[int]] = {}
-        self._spans: dict[int, list[tuple[int, int]]] = {}
-
-    def put(self, number: int, box: F32) -> None:
-        span = self._covered(box, 0.0)
-        if self._spans.get(number) != span:
-            self.remove(number)
-            self._spans[number] = span
-            for cell in span:
-                self._cells.setdefault(cell, set()).add(number)
-
-    def remove(self, number: int) -> None:
-        for cell in self._spans.pop(number, ()):
-            self._cells[cell].discard(number)
-
-    def near(self, box: F32, reach_m: float) -> list[int]:
-        found: set[int] = set()
-        for cell in self._covered(box, reach_m):
-            found |= self._cells.get(cell, set())
-        return sorted(found)
-
-    @staticmethod
-    def _covered(box: F32, reach_m: float) -> list[tuple[int, int]]:
-        (x0, y0), (x1, y1) = np.floor(box[0, :2] - reach_m).tolist(), np.floor(box[1, :2] + reach_m).tolist()
-        return [(x, y) for x in range(int(x0), int(x1) + 1) for y in range(int(y0), int(y1) + 1)]
-
-
-def _share_near(points: NDArray[np.float64], tree: cKDTree, reach_m: float) -> float:
-    if not len(points):
-        return 0.0
-    distance, _ = tree.query(points, distance_upper_bound=reach_m)
-    return float(np.isfinite(distance).mean())
-
-
-def _boxes_meet(a: F32, b: F32, reach_m: float) -> bool:
-    return bool((a[0] <= b[1] + reach_m).all() and (b[0] <= a[1] + reach_m).all())
-
-
-def _inside(a: F32, b: F32, reach_m: float) -> float:
-    """Share of the smaller box inside the other; both grown, as one view of a thing may be a thin sheet."""
-    sizes = [box[1] - box[0] + reach_m for box in (a, b)]
-    shared = np.clip(np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]) + reach_m, 0, None)
-    return float(np.prod(shared) / min(np.prod(sizes[0]), np.prod(sizes[1])))

@@ -1,7 +1,8 @@
 """The world's cloud as an incremental voxel map, and the space that rays have passed through.
 
-Both are keyed by packed cell indices and cost O(new points) a frame.
-Source: paper, "Method" (the cloud P accumulated from posed RGB-D). Departs: accumulated frame by frame, not at the end.
+Both are layers of cells and cost O(new points) a frame.
+Source: paper, "Method" (the cloud P accumulated from posed RGB-D). Departs: accumulated frame by frame, not at the end;
+what is seen through again and again goes.
 """
 
 from __future__ import annotations
@@ -10,46 +11,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.runtime.errors import SchemaError
+from placegraph.nodes.fusion.cells import corners, pack, sum_by_key, unpack
+from placegraph.nodes.fusion.layer import Layer, grown
+from placegraph.nodes.fusion.sight import Sight
+from placegraph.runtime.geometry import transform
 
 Bool = NDArray[np.bool_]
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
 U8 = NDArray[np.uint8]
 Points = NDArray[np.floating]
 
-_BITS = 21  # a cell index of each axis; three fit an int64
-_HALF = 1 << (_BITS - 1)
-
-
-def pack(xyz: Points, cell_m: Points | float) -> I64:
-    """(N, 3) metres to one int64 per point that names its cell of size `cell_m` (a number, or one per axis).
-
-    Raises SchemaError for points that are not finite or lie further out than 2**20 cells.
-    """
-    cells = np.floor(np.asarray(xyz, float) / cell_m)
-    if not (np.abs(cells) < _HALF).all():  # also false for NaN
-        raise SchemaError(f"a point of the map is not finite or more than {_HALF} cells of {cell_m} m from the origin")
-    x, y, z = (cells.astype(np.int64) + _HALF).T
-    return np.asarray((x << (2 * _BITS)) | (y << _BITS) | z)
-
-
-def unpack(keys: I64, cell_m: Points | float) -> F64:
-    """Centres (N, 3) in metres of packed cells."""
-    mask = (1 << _BITS) - 1
-    cells = np.stack((keys >> (2 * _BITS), (keys >> _BITS) & mask, keys & mask), axis=1) - _HALF
-    return np.asarray((cells + 0.5) * cell_m)
-
-
-def sum_by_key(keys: I64, values: F64) -> tuple[I64, F64]:
-    """Add up the rows of values (N, D) that share a key: (sorted unique keys (M,), sums (M, D))."""
-    if not len(keys):
-        return keys, values
-    order = np.argsort(keys, kind="stable")
-    ordered = keys[order]
-    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
-    return ordered[starts], np.add.reduceat(values[order], starts, axis=0)
+_STEPS = 1024  # of a voxel's edge to which a point is rounded before it is summed: .05 mm of 5 cm
 
 
 def depth_edges(depth_m: F32, ratio: float = 0.05) -> Bool:
@@ -64,70 +39,110 @@ def depth_edges(depth_m: F32, ratio: float = 0.05) -> Bool:
     return np.asarray((farthest - nearest > ratio * nearest) & (depth_m > 0))
 
 
-class VoxelMap:
-    """Voxels of the world's cloud: sums of positions (m, world), colours (sRGB) and counts."""
+class VoxelMap(Layer):
+    """Voxels of the world's cloud: sums of positions within the voxel, of colours (sRGB), and counts of points."""
 
-    def __init__(self, voxel_m: float) -> None:
+    def __init__(self, voxel_m: float, keep: bool = False) -> None:
+        super().__init__(np.full(3, voxel_m), 7, keep)
         self.voxel_m = voxel_m
-        self._rows: dict[int, int] = {}
-        self._sums = np.zeros((1024, 7))
+        self._xyz: F32 = np.zeros((1024, 3), np.float32)  # as `points` gives them
+        self._rgb: U8 = np.zeros((1024, 3), np.uint8)
+        self._seen_through = np.zeros(1024, np.uint8)  # keyframes, less those that saw it
 
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def add(self, xyz_world: Points, colors: U8) -> None:
+    def fuse(self, xyz_world: Points, colors: U8, submap: int = 0) -> None:
         """Add points (N, 3) in metres with colours (N, 3). Raises SchemaError for points that are not finite."""
-        values = np.concatenate((xyz_world, colors, np.ones((len(xyz_world), 1))), axis=1).astype(float)
-        keys, sums = sum_by_key(pack(xyz_world, self.voxel_m), values)
-        rows = np.array([self._rows.setdefault(key, len(self._rows)) for key in keys.tolist()], np.int64)
-        if len(self._rows) > len(self._sums):
-            grown = np.zeros((max(len(self._rows), 2 * len(self._sums)), 7))
-            grown[: len(self._sums)] = self._sums
-            self._sums = grown
-        self._sums[rows] += sums
+        keys = pack(xyz_world, self.voxel_m)
+        within = np.asarray(xyz_world, float) / self.voxel_m - corners(keys)  # 0..1
+        steps = np.rint(within * _STEPS).astype(np.int32)
+        ones = np.ones((len(keys), 1), np.int32)
+        self.add(*sum_by_key(keys, np.concatenate((steps, colors.astype(np.int32), ones), axis=1)), submap)
+
+    def look(self, sight: Sight) -> None:
+        """Remove what so many keyframes more have seen through than seen."""
+        rows = np.asarray(sight.rows_in_view(self.index), np.int64)
+        rows = rows[self.sums[rows, -1] > 0]
+        through, there = sight.judge(self._xyz[rows])
+        self._seen_through[rows[through]] += 1
+        self._seen_through[rows[there & (self._seen_through[rows] > 0)]] -= 1
+        self.remove(rows[self._seen_through[rows] >= sight.config.views])
+
+    def remove(self, rows: I64) -> None:
+        """Take voxels out of the map; seen again, they start anew."""
+        super().remove(rows)
+        self._seen_through[rows] = 0
 
     def points(self) -> F32:
         """Centroids (P, 3), metres, world frame, oldest voxel first."""
-        sums = self._sums[: len(self)]
-        return np.asarray(sums[:, :3] / sums[:, 6:], np.float32)
+        return self._xyz[self.live()]
 
     def colors(self) -> U8:
         """Mean colours (P, 3) in the order of `points`."""
-        sums = self._sums[: len(self)]
-        return np.asarray(np.rint(sums[:, 3:6] / sums[:, 6:]), np.uint8)
+        return self._rgb[self.live()]
+
+    def place(self, keys: I64, sums: I32, world_from_fused: F64) -> tuple[I64, I32]:
+        """Each voxel's points go where its centroid goes."""
+        counts = sums[:, 6:]
+        moved = transform(world_from_fused, self._centroids(keys, sums)) / self.voxel_m
+        cells = pack(moved, 1.0)
+        steps = np.rint((moved - corners(cells)) * _STEPS).astype(np.int32)
+        return cells, np.concatenate((steps * counts, sums[:, 3:]), axis=1)
+
+    def changed(self, rows: I64) -> None:
+        """Keep positions and colours ready, so that giving the map copies them and computes nothing."""
+        rows = rows[self.sums[rows, 6] > 0]
+        sums = self.sums[rows]
+        self._xyz[rows] = self._centroids(self.keys[rows], sums)
+        self._rgb[rows] = np.rint(sums[:, 3:6] / sums[:, 6:])
+
+    def grow(self, size: int) -> None:
+        """Make room for so many rows."""
+        super().grow(size)
+        self._xyz, self._rgb = grown(self._xyz, size), grown(self._rgb, size)
+        self._seen_through = grown(self._seen_through, size)
+
+    def _centroids(self, keys: I64, sums: I32) -> F64:
+        return np.asarray((corners(keys) + sums[:, :3] / sums[:, 6:] / _STEPS) * self.voxel_m)
 
 
-class FreeSpace:
+# a cell that has moved is there where two of these points of it lie, in shares of a cell: it neither grows nor shrinks
+_SAMPLES = np.array([(x, y, 0.0) for x in (-0.25, 0.25) for y in (-0.25, 0.25)])
+
+
+class FreeSpace(Layer):
     """Cells that a ray crossed on its way to a surface: fine in plan, coarse in height."""
 
-    def __init__(self, cell_m: float, height_m: float, clearance_m: float) -> None:
-        self.cell = np.array([cell_m, cell_m, height_m])
+    def __init__(self, cell_m: float, height_m: float, clearance_m: float, keep: bool = False) -> None:
+        super().__init__(np.array([cell_m, cell_m, height_m]), 1, keep)
         self._clearance_m = clearance_m
-        self._keys: set[int] = set()
 
-    def __len__(self) -> int:
-        return len(self._keys)
-
-    def carve(self, origin_world: F64, ends_world: Points) -> None:
+    def carve(self, origin_world: F64, ends_world: Points, submap: int = 0) -> None:
         """Mark the cells between a camera (3,) and surface points (N, 3), short of the surface by the clearance.
 
         Only one ray is followed to each cell of end points, so that a near wall costs no more than a far one.
         """
         if not len(ends_world):
             return
-        _, first = np.unique(pack(ends_world, self.cell), return_index=True)
+        _, first = np.unique(pack(ends_world, self.cell_m), return_index=True)
         rays = np.asarray(ends_world, float)[first] - origin_world
         lengths = np.linalg.norm(rays, axis=1)
-        step = self.cell[0]
+        step = self.cell_m[0]
         counts = np.ceil(np.clip(lengths - self._clearance_m, 0, None) / step).astype(np.int64)
         if not counts.any():
             return
         ray = np.repeat(np.arange(len(rays)), counts)
         nth = np.arange(len(ray)) - np.repeat(np.cumsum(counts) - counts, counts)
         along = np.minimum((nth + 0.5) * step, lengths[ray] - self._clearance_m) / lengths[ray]
-        self._keys.update(np.unique(pack(origin_world + rays[ray] * along[:, None], self.cell)).tolist())
+        keys = np.unique(pack(origin_world + rays[ray] * along[:, None], self.cell_m))
+        self.add(keys, np.ones((len(keys), 1), np.int32), submap)
 
     def points(self) -> F32:
-        """Centres (F, 3) of the cells, metres, world frame, in a fixed order."""
-        keys = np.sort(np.fromiter(self._keys, np.int64, len(self._keys)))
-        return unpack(keys, self.cell).astype(np.float32)
+        """Centres (F, 3) of the cells, metres, world frame, oldest cell first."""
+        return unpack(self.keys[self.live()], self.cell_m).astype(np.float32)
+
+    def place(self, keys: I64, sums: I32, world_from_fused: F64) -> tuple[I64, I32]:
+        """A cell becomes those that hold two of its four quarters, its own or its neighbours'."""
+        quarters = (unpack(keys, self.cell_m)[:, None] + _SAMPLES * self.cell_m).reshape(-1, 3)
+        cells = pack(transform(world_from_fused, quarters), self.cell_m)
+        found, hits = sum_by_key(cells, np.ones((len(cells), 1), np.int32))
+        kept = hits[:, 0] >= 2
+        return found[kept], np.ones((int(kept.sum()), 1), np.int32)

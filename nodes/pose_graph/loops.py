@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from placegraph.runtime.features import FeatureConfig, Features, describe, relate
+from placegraph.runtime.geometry import inverse
 from placegraph.runtime.messages import Keyframe
+from placegraph.runtime.registration import Registered, logarithm
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -33,6 +35,10 @@ class LoopConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     turn_rad: float = 0.8  # between viewing directions
     tries: int = Field(default=4, ge=1)  # candidates that are verified for each keyframe, by their poses
     apart: int = 5  # keyframes between two candidates
+    # a place that looks like another, a few steps away, is told by how far odometry can be wrong by then
+    surprise_m: float = 0.1
+    surprise_rad: float = 0.05
+    surprise_share: float = 0.05  # more for each metre walked between the two views, in metres and in rad
     tries_by_look: int = 1  # ... and by the layout of colours, wherever they are
     least_likeness: float = 0.9  # of layouts: their correlation
     features: FeatureConfig = FeatureConfig()
@@ -73,9 +79,16 @@ class Places:
         near = self._near(poses, walked_m)
         for old in [*near, *self._alike(near)]:
             pose = relate(self.features[old], self.features[new], self.config.features)
-            if pose is not None:
+            if pose is not None and self._is_likely(
+                inverse(poses[old]) @ poses[new], pose, walked_m[new] - walked_m[old]
+            ):
                 found.append(Loop(old, new, pose.reference_from_camera, int(pose.inlier.sum())))
         return found
+
+    def _is_likely(self, expected: F64, found: Registered, walked_m: float) -> bool:
+        c, off = self.config, logarithm(inverse(expected) @ found.reference_from_camera)
+        more = c.surprise_share * walked_m
+        return bool(np.linalg.norm(off[:3]) < c.surprise_m + more and np.linalg.norm(off[3:]) < c.surprise_rad + more)
 
     def _near(self, poses: F64, walked_m: F64) -> list[int]:
         c, new = self.config, len(poses) - 1

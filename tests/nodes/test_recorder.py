@@ -127,6 +127,13 @@ def map_of(names: dict[int, tuple[str, ...]], frame_id: int = 0, points: int = 5
         tag_names=tuple(name for tags in names.values() for name in tags),
         tag_votes=np.ones(sum(map(len, names.values())), np.float32),
         tag_offsets=np.cumsum([0, *map(len, names.values())], dtype=np.int64),
+        retired_ids=np.zeros(0, np.int64),
+        retired_boxes_world=np.zeros((0, 2, 3), np.float32),
+        retired_last_frames=np.zeros(0, np.int64),
+        retired_gone_frames=np.zeros(0, np.int64),
+        retired_tag_names=(),
+        retired_tag_votes=np.zeros(0, np.float32),
+        retired_tag_offsets=np.zeros(1, np.int64),
     )
 
 

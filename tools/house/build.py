@@ -15,8 +15,9 @@ from placegraph.runtime.node import plugin
 from placegraph.tools.house.furnish import furnish
 from placegraph.tools.house.model import House
 from placegraph.tools.house.plan import lay_out
+from placegraph.tools.house.rearrange import rearrange
 from placegraph.tools.house.sensor import house_settings, sense
-from placegraph.tools.house.walk import walk
+from placegraph.tools.house.walk import Walk, walk
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -57,13 +58,24 @@ def renderer_of(house: House, width: int, height: int) -> Any:
 
 
 class HouseFrames:
-    """The frames of one house along its walk; each is made by itself, so any may be made first, in any process."""
+    """The frames of one house along its walk; each is made by itself, so any may be made first, in any process.
 
-    def __init__(self, seed: int, floors: int | None = None, width: int = 640, height: int = 480) -> None:
-        self.house = build(seed, floors)
-        self.stamps_ns, self.world_from_camera = walk(self.house, seed)
+    moved: so many pieces of furniture are moved after the walk, and the house is walked again, backwards: the second
+    film begins about where the first ended. `before` is the house of the first `frames_before` frames, `house` that of
+    the others.
+    """
+
+    def __init__(
+        self, seed: int, floors: int | None = None, width: int = 640, height: int = 480, moved: int = 0
+    ) -> None:
+        self.before = build(seed, floors)
+        self.house = rearrange(self.before, moved, seed) if moved else self.before
+        first = walk(self.before, seed)
+        self.frames_before = len(first.stamps_ns)
+        self.stamps_ns, self.world_from_camera = _and_back(first, walk(self.house, seed)) if moved else first
         self._sensor_settings = house_settings(seed)
         self._renderer = renderer_of(self.house, width, height)
+        self._renderer_before = renderer_of(self.before, width, height) if moved else self._renderer
         self.intrinsics: F64 = np.asarray(self._renderer.intrinsics, np.float64)  # (4,) fx fy cx cy in px
 
     def count(self, limit: int = 0) -> int:
@@ -77,11 +89,19 @@ class HouseFrames:
     def frame(self, index: int) -> HouseFrame:
         """The frame of that index."""
         pose = np.asarray(self.world_from_camera[index], np.float64)
-        view = self._renderer.render(pose)
+        view = (self._renderer_before if index < self.frames_before else self._renderer).render(pose)
         # a generator of its own for each frame: no frame depends on those made before it
         random = np.random.default_rng([self.house.seed, SENSOR_SALT, index])
         color, depth_m = sense(view, self.intrinsics, random, self._sensor_settings)
         return HouseFrame(index, int(self.stamps_ns[index]), color, quantised(depth_m), view.instance, pose)
+
+
+def _and_back(first: Walk, second: Walk) -> Walk:
+    """The first walk, then the second one backwards, a frame's time later."""
+    step_ns = int(first.stamps_ns[1] - first.stamps_ns[0])
+    back_ns = first.stamps_ns[-1] + step_ns + (second.stamps_ns[-1] - second.stamps_ns[::-1])
+    poses = np.concatenate((first.world_from_camera, second.world_from_camera[::-1]))
+    return Walk(np.concatenate((first.stamps_ns, back_ns)), poses)
 
 
 def quantised(depth_m: F32) -> F32:

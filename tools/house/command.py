@@ -19,6 +19,9 @@ def house(
     floors: Annotated[int | None, typer.Option(min=1, max=3, help="Floors (default: the seed chooses).")] = None,
     limit: Annotated[int, typer.Option(min=0, help="Stop after so many frames (0: the whole walk).")] = 0,
     width: Annotated[int, typer.Option(min=64, max=4096, help="Image width in px; the height is 3/4 of it.")] = 640,
+    moved: Annotated[
+        int, typer.Option(min=0, help="Move so many pieces of furniture after the walk, and film the house again.")
+    ] = 0,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes (default: one for each core); the result is the same.")
     ] = None,
@@ -26,7 +29,7 @@ def house(
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
 ) -> None:
     """Make a house and film it; `placegraph run CONFIG --source OUT` maps it."""
-    order = HouseOrder(seed, floors, limit, width, width * 3 // 4)
+    order = HouseOrder(seed, floors, limit, width, width * 3 // 4, moved)
     made = _already_there(out, order, replace)
     run = made or export(order, out, workers, quiet)
     size = f"{run.width}x{run.height}"
@@ -49,7 +52,8 @@ def _already_there(out: Path, order: HouseOrder, replace: bool) -> HouseRun | No
             return None
         if not order.is_made_by(run):
             raise ConfigError(
-                f"{out}: holds another house (seed {run.seed}, limit {run.limit}, {run.width}x{run.height}, generator "
+                f"{out}: holds another house (seed {run.seed}, limit {run.limit}, {run.width}x{run.height}, "
+                f"moved {run.moved}, generator "
                 f"{run.version}); choose another --out or remove it"
             )
         return run

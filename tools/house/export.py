@@ -29,7 +29,17 @@ from placegraph.tools.house.build import HouseFrame, HouseFrames, generator_vers
 from placegraph.tools.house.model import House
 from placegraph.tools.house.picture import draw
 from placegraph.tools.house.questions import questions, to_json
-from placegraph.tools.house.truth import CLEAR_SHARE, QUESTIONS, TRUTH, HouseRun, Seen, truth_of, write_truth
+from placegraph.tools.house.rearrange import changed_ids
+from placegraph.tools.house.truth import (
+    CLEAR_SHARE,
+    QUESTIONS,
+    TRUTH,
+    HouseRun,
+    Seen,
+    truth_of,
+    write_before,
+    write_truth,
+)
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -41,19 +51,31 @@ LEAST_CLEAR_FRAMES = 5  # of what is asked about
 
 @dataclass(frozen=True)
 class HouseOrder:
-    """Which house, seen how: the seed, its floors (None: the seed chooses), frames at most (0: all), image size."""
+    """Which house, seen how: the seed, its floors (None: the seed chooses), frames at most (0: all), image size.
+
+    moved: pieces of furniture that are moved before the house is filmed a second time; 0: it is filmed once.
+    """
 
     seed: int
     floors: int | None = None
     limit: int = 0
     width: int = 640
     height: int = 480
+    moved: int = 0
+
+    def frames(self) -> HouseFrames:
+        """The house and its frames."""
+        return HouseFrames(self.seed, self.floors, self.width, self.height, self.moved)
+
+    def run(self, frames: int, frames_before: int) -> HouseRun:
+        """What a folder says that is made to this order by this very generator."""
+        size = self.width, self.height
+        version = generator_version()
+        return HouseRun(self.seed, self.floors, self.limit, *size, version, frames, self.moved, frames_before)
 
     def is_made_by(self, run: HouseRun) -> bool:
         """Whether a folder that says this of itself is what is asked for, made by this very generator."""
-        return run == HouseRun(
-            self.seed, self.floors, self.limit, self.width, self.height, generator_version(), run.frames
-        )
+        return run == self.run(run.frames, run.frames_before)
 
 
 def export(order: HouseOrder, out: Path, workers: int | None = None, quiet: bool = True) -> HouseRun:
@@ -61,25 +83,32 @@ def export(order: HouseOrder, out: Path, workers: int | None = None, quiet: bool
 
     Raises SourceError when the folder cannot be written.
     """
-    source = HouseFrames(order.seed, order.floors, order.width, order.height)
+    source = order.frames()
     count = source.count(order.limit)
-    run = HouseRun(order.seed, order.floors, order.limit, order.width, order.height, generator_version(), count)
+    run = order.run(count, min(source.frames_before, count))
+    changed = changed_ids(source.before, source.house)
     with _written_whole(out) as folder:
         for name in ("rgb", "depth", f"{TRUTH}/instances"):
             (folder / name).mkdir(parents=True)
         views = np.zeros((len(source.house.items), 2), np.int64)  # frames, clear frames
-        for pixels in track(
-            _frames(order, source, folder, workers or os.cpu_count() or 1),
-            total=count,
-            description=f"house {order.seed}",
-            console=Console(stderr=True),
-            disable=quiet,
+        for index, pixels in enumerate(
+            track(
+                _frames(order, source, folder, workers or os.cpu_count() or 1),
+                total=count,
+                description=f"house {order.seed}",
+                console=Console(stderr=True),
+                disable=quiet,
+            )
         ):
+            if index == source.frames_before:
+                views[list(changed)] = 0  # seen where they no longer are
             views[:, 0] += pixels > 0
             views[:, 1] += pixels >= CLEAR_SHARE * order.width * order.height
         _write_lists(source, count, folder)
         seen = tuple(Seen(id, frames, clear) for id, (frames, clear) in enumerate(views.tolist()))
         write_truth(truth_of(source.house, run, seen), folder)
+        if order.moved:
+            write_before(source.before, changed, folder)
         _write_questions(source.house, seen, folder)
         _write_image(folder / "plan.png", draw(source.house, source.world_from_camera[:count, :3, 3])[..., ::-1])
     return run
@@ -127,7 +156,7 @@ _worker: dict[str, Any] = {}  # what a worker process makes once: its own copy o
 def _start_worker(order: HouseOrder, folder: Path) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the process that started this one, which ends this one
     cv2.setNumThreads(1)  # there is a process for each core
-    _worker["source"] = HouseFrames(order.seed, order.floors, order.width, order.height)
+    _worker["source"] = order.frames()
     _worker["folder"] = folder
 
 

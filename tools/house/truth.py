@@ -21,6 +21,7 @@ from placegraph.tools.house.passages import passages
 F64 = NDArray[np.float64]
 
 TRUTH = "truth"  # the folder beside rgb/ and depth/
+BEFORE = "before.json"  # where what was moved stood before
 QUESTIONS = "questions.json"  # read and written by questions.py
 CLEAR_SHARE = 400 / (640 * 480)  # of the image: 20 x 20 px of 640 x 480
 _STRICT = ConfigDict(strict=True, extra="forbid")
@@ -63,6 +64,8 @@ class HouseRun:
     height: int
     version: str  # build.generator_version()
     frames: int  # so many there are
+    moved: int = 0  # pieces of furniture between the two walks; 0: there is one walk
+    frames_before: int = 0  # the move; all of them when nothing was moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +161,7 @@ class Truth:
     rooms: tuple[TrueRoom, ...]
     floors: tuple[TrueFloor, ...]
     locations: tuple[TrueLocation, ...]
-    seen: tuple[Seen, ...]  # one for each object, by id
+    seen: tuple[Seen, ...]  # one for each object, by id; of what was moved, at its last place
     connections: tuple[TrueConnection, ...] | None = None  # None: the folder says nothing of them
 
 
@@ -231,6 +234,22 @@ def read_truth(dir: Path) -> Truth:
     if ids != list(range(len(ids))) or [one.id for one in truth.seen] != ids:
         raise SourceError(f"{dir / TRUTH}: objects.json and seen.json do not hold the same objects, counted from 0")
     return truth
+
+
+def write_before(before: House, ids: tuple[int, ...], folder: Path) -> None:
+    """Write truth/before.json: the objects of these ids as they stood before they were moved."""
+    floor_of_room = {room.id: room.floor for room in before.rooms}
+    objects = tuple(_true_object(before.items[id], floor_of_room[before.items[id].room]) for id in ids)
+    values = _rounded(_FILES["objects"].dump_python(objects, mode="json", by_alias=True))
+    text = json.dumps(values, sort_keys=True, ensure_ascii=False, allow_nan=False, indent=1)
+    (folder / TRUTH / BEFORE).write_text(text + "\n", encoding="utf-8")
+
+
+def read_before(dir: Path) -> tuple[TrueObject, ...]:
+    """What was moved, as it stood before; () where nothing was. Raises SourceError when it is damaged."""
+    file = dir / TRUTH / BEFORE
+    objects: tuple[TrueObject, ...] = _read(file, "objects") if file.exists() else ()
+    return objects
 
 
 def read_house_run(dir: Path) -> HouseRun | None:

@@ -120,6 +120,14 @@ def rooms_of_frames(house: House, world_from_camera: F64) -> I64:
     return rooms
 
 
+def check_reachable(house: House, floor_index: int) -> None:
+    """Raise SourceError unless every room and the stairs of a floor can be reached on foot."""
+    here = _ground(house, house.floors[floor_index])
+    for flight in house.stairs:
+        if floor_index in (flight.floor, flight.floor + 1):
+            _landing(house, flight, here, up=floor_index > flight.floor)
+
+
 def _ground(house: House, floor: Floor) -> Ground:
     """The ground of a floor; every room must be part of what hangs together."""
     made = ground(*free_grid(house, floor.index, cell_m=CELL_M, radius_m=RADIUS_M), CELL_M)

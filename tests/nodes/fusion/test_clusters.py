@@ -1,6 +1,6 @@
 import numpy as np
 
-from placegraph.nodes.fusion.clusters import dbscan, largest_cluster
+from placegraph.nodes.fusion.clusters import dbscan, main_clusters
 
 
 def line(start, count):
@@ -9,7 +9,7 @@ def line(start, count):
 
 def test_no_points():
     assert dbscan(np.zeros((0, 3)), 0.1, 3).tolist() == []
-    assert largest_cluster(np.zeros((0, 3)), 0.1, 3).tolist() == []
+    assert main_clusters(np.zeros((0, 3)), 0.1, 3, 1.0).tolist() == []
 
 
 def test_one_point_is_noise_unless_one_is_enough():
@@ -20,7 +20,7 @@ def test_one_point_is_noise_unless_one_is_enough():
 def test_two_lines_and_a_stray_point():
     points = np.concatenate((line(0, 10), line(1, 20), [[5.0, 5, 5]]))
     assert dbscan(points, 0.05, 3).tolist() == [0] * 10 + [1] * 20 + [-1]
-    assert largest_cluster(points, 0.05, 3).tolist() == list(range(10, 30))
+    assert main_clusters(points, 0.05, 3, 1.0).tolist() == list(range(10, 30))
 
 
 def test_clusters_are_numbered_by_their_first_point():

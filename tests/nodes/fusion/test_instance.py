@@ -1,8 +1,8 @@
 import numpy as np
 
+from placegraph.nodes.fusion.cells import pack, sum_by_key
 from placegraph.nodes.fusion.instance import Instance
 from placegraph.nodes.fusion.lift import Observation
-from placegraph.nodes.fusion.voxels import pack, sum_by_key
 from placegraph.runtime.geometry import bounding_box
 
 
@@ -19,7 +19,7 @@ def block(low=0.0):
 
 
 def test_one_point_is_its_own_solid():
-    points, color = Instance(0, seen(np.full((1, 3), 0.5)), 0, 0).solid(0.075, 10)
+    points, color, *_ = Instance(0, seen(np.full((1, 3), 0.5)), 0, 0).solid(0.075, 10)
     assert np.allclose(points, 0.5) and color.tolist() == [10, 20, 30]
 
 
@@ -37,7 +37,7 @@ def test_an_object_seen_from_all_around_keeps_every_side():
     instance = Instance(0, seen(parts[0]), 0, 0)
     for k in range(1, 5):
         instance.update(seen(parts[k]), k, k)
-    points, _ = instance.solid(0.075, 10)
+    points = instance.solid(0.075, 10).points
     assert points[:, 0].max() > 0.85 and points[:, 0].min() < 0.05
 
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.fusion.voxels import FreeSpace, VoxelMap, depth_edges, pack, sum_by_key, unpack
+from placegraph.nodes.fusion.cells import pack, sum_by_key, unpack
+from placegraph.nodes.fusion.voxels import FreeSpace, VoxelMap, depth_edges
 from placegraph.runtime.errors import SchemaError
 
 
@@ -29,15 +30,15 @@ def test_sum_by_key_of_nothing_and_of_shared_keys():
 
 def test_empty_map():
     voxels = VoxelMap(0.05)
-    voxels.add(np.zeros((0, 3)), colors(0))
+    voxels.fuse(np.zeros((0, 3)), colors(0))
     assert len(voxels) == 0 and voxels.points().shape == (0, 3) and voxels.colors().shape == (0, 3)
 
 
 def test_points_of_one_voxel_are_averaged_over_calls():
     voxels = VoxelMap(1.0)
-    voxels.add(np.array([[0.2, 0.2, 0.2]]), colors(1, 10))
-    voxels.add(np.array([[0.4, 0.6, 0.2], [1.5, 0.0, 0.0]]), colors(2, 20))
-    assert np.allclose(voxels.points(), [[0.3, 0.4, 0.2], [1.5, 0, 0]])
+    voxels.fuse(np.array([[0.2, 0.2, 0.2]]), colors(1, 10))
+    voxels.fuse(np.array([[0.4, 0.6, 0.2], [1.5, 0.0, 0.0]]), colors(2, 20))
+    assert np.allclose(voxels.points(), [[0.3, 0.4, 0.2], [1.5, 0, 0]], atol=1e-3)
     assert voxels.colors().tolist() == [[15] * 3, [20] * 3]
 
 
@@ -45,7 +46,7 @@ def test_map_grows_past_its_first_size_and_keeps_old_rows():
     xyz = np.stack((np.arange(5000.0), np.zeros(5000), np.zeros(5000)), axis=1)
     voxels = VoxelMap(1.0)
     for part in np.split(xyz, 10):
-        voxels.add(part, colors(len(part)))
+        voxels.fuse(part, colors(len(part)))
     assert np.allclose(voxels.points(), xyz)
 
 

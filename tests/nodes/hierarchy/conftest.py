@@ -75,6 +75,13 @@ def make_map() -> Callable[..., Map]:
             tag_names=tuple(name for name, _, _ in objects.values()),
             tag_votes=np.full(n, 2.0, np.float32),
             tag_offsets=np.arange(n + 1, dtype=np.int64),
+            retired_ids=np.zeros(0, np.int64),
+            retired_boxes_world=np.zeros((0, 2, 3), np.float32),
+            retired_last_frames=np.zeros(0, np.int64),
+            retired_gone_frames=np.zeros(0, np.int64),
+            retired_tag_names=(),
+            retired_tag_votes=np.zeros(0, np.float32),
+            retired_tag_offsets=np.zeros(1, np.int64),
         )
         made.check()
         return made
