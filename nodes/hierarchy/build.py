@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from placegraph.runtime.geometry import bounding_box, convex_footprint
 from placegraph.runtime.messages import Map
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 
-F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
 Points = NDArray[np.floating]
 
 
@@ -45,9 +46,9 @@ class GraphBuilder:
         self._config, self._detector = config, detector
         self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
         self._places = PlaceGraphBuilder(config.travel, config.floors, config.rooms)
-        self._known_rooms: Unchanged[tuple[Grid, list[RoomArea], F64]] = Unchanged()
+        self._known_rooms: Unchanged[tuple[Grid, list[RoomArea], F32]] = Unchanged()
         self._known_locations: Unchanged[list[LocationArea]] = Unchanged()
-        self._known_footprints: Unchanged[F64] = Unchanged()
+        self._known_footprints: Unchanged[F32] = Unchanged()
 
     def build(self, world: Map) -> SceneGraph:
         """The graph of a Map; rooms and locations are without names. Deterministic in the sequence of maps.
@@ -94,10 +95,10 @@ class GraphBuilder:
 
     def _find_rooms(
         self, points: Points, free: Points, free_cell_m: float, span: FloorSpan
-    ) -> tuple[Grid, list[RoomArea], F64]:
+    ) -> tuple[Grid, list[RoomArea], F32]:
         """Rooms of a floor and its own outline, made again only when its points, free space or heights changed."""
 
-        def make() -> tuple[Grid, list[RoomArea], F64]:
+        def make() -> tuple[Grid, list[RoomArea], F32]:
             return *find_rooms(points, free, free_cell_m, span, self._config.rooms), convex_footprint(points)
 
         return self._known_rooms.get(digest(points, free, free_cell_m, span.low, span.high), make)
@@ -120,7 +121,7 @@ class GraphBuilder:
             box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
         for i, key in enumerate(digests):
-            footprint = self._known_footprints.get(key, lambda i=i: convex_footprint(objects[i]))  # type: ignore[misc]
+            footprint = self._known_footprints.get(key, partial(convex_footprint, objects[i]))
             nodes.append(_object(i, parent[i], footprint, world))
         return nodes
 
@@ -168,7 +169,7 @@ def _place(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tu
     return _node(node_id, parent, box, outline, tags=tags)
 
 
-def _object(i: int, parent: str, footprint: F64, world: Map) -> Node:
+def _object(i: int, parent: str, footprint: Points, world: Map) -> Node:
     votes = slice(int(world.tag_offsets[i]), int(world.tag_offsets[i + 1]))
     names, weights = world.tag_names[votes], world.tag_votes[votes].tolist()
     return _node(

@@ -142,7 +142,14 @@ class PlaceGraphBuilder:
         steps = steps_on(number, world.camera_positions_world, standing, self._config)
         deep = deep_points(world.points_world, plan.span, self._config)
         masks = [mask for _, mask in plan.rooms]
-        made_of = (plan.points_world, deep, plan.free_points_world, steps, plan.grid.origin, *masks)
+        made_of: tuple[Points | Bool, ...] = (
+            plan.points_world,
+            deep,
+            plan.free_points_world,
+            steps,
+            plan.grid.origin,
+            *masks,
+        )
         known = self._floors.get(plan.id)
         if known is not None and known.plan.span == plan.span and _equal(known.made_of, made_of):
             return _Floor(plan, known.ground, known.owner, known.openings, made_of)
