@@ -53,6 +53,14 @@ def test_a_thin_table_top_is_in_the_way_and_a_single_voxel_is_not():
     assert at(ground(np.concatenate((FLOOR, [(2.025, 2.025, 0.7)]))).passable, 2.025, 2.025)
 
 
+def test_the_noise_before_a_wall_is_no_obstacle_and_a_low_thing_before_it_is():
+    wall = np.concatenate([spread((1.0, 3.0), (3.0, 3.1), z) for z in np.arange(0.2, 2.4, 0.05)])
+    noise = np.concatenate([spread((1.0, 3.0), (2.9, 3.0), z) for z in (0.5, 0.9, 1.3)])
+    box = np.concatenate([spread((1.5, 2.0), (2.7, 3.0), z) for z in (0.2, 0.25, 0.3)])
+    made = ground(np.concatenate((FLOOR, wall, noise, box)))
+    assert at(made.passable, 2.5, 2.95) and not at(made.passable, 2.5, 3.05) and not at(made.passable, 1.75, 2.75)
+
+
 def test_where_the_camera_went_the_robot_may_stand_whatever_was_seen():
     made = ground(NOTHING, NOTHING, [((1, 1, 1.4), (2, 1, 1.4))])
     assert at(made.standing, 1.5, 1) and at(made.passable, 1.5, 1.2) and not at(made.passable, 1.5, 1.4)
