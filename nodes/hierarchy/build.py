@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -38,6 +38,14 @@ class LayerConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     travel: TravelConfig = TravelConfig()
 
 
+@dataclass(frozen=True, eq=False)
+class _Extent:
+    """Of all points of a floor: box (2, 3) and convex outline (K, 2), metres, world."""
+
+    box: F64
+    outline: F64
+
+
 class GraphBuilder:
     """Builds a graph from each Map and remembers which place has which id."""
 
@@ -46,7 +54,7 @@ class GraphBuilder:
         self._config, self._detector = config, detector
         self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
         self._places = PlaceGraphBuilder(config.travel, config.floors, config.rooms)
-        self._known_rooms: Unchanged[tuple[Grid, list[RoomArea], F32]] = Unchanged()
+        self._known_rooms: Unchanged[tuple[Grid, list[RoomArea], _Extent]] = Unchanged()
         self._known_locations: Unchanged[list[LocationArea]] = Unchanged()
         self._known_footprints: Unchanged[F32] = Unchanged()
 
@@ -62,20 +70,22 @@ class GraphBuilder:
             spans = find_floors(world.object_points_world, world.camera_positions_world, self._config.floors)
         points = world.points_world if len(world.points_world) else world.object_points_world
         floor_ids = self._floors.assign([Place(span_footprint(s.low, max(s.high, s.low + 0.1))) for s in spans])
-        nodes = [_building(points)]
+        nodes: list[Node] = []
         rooms: list[HomeRoom] = []
+        extents: list[_Extent] = []
         for i, (span, floor_id) in enumerate(zip(spans, floor_ids, strict=True)):
             inside, free = _in_zone(points, span), _in_zone(world.free_points_world, span)
-            grid, areas, outline = self._find_rooms(inside, free, world.free_cell_m, span)
+            grid, areas, extent = self._find_rooms(inside, free, world.free_cell_m, span)
+            extents.append(extent)
             ids = self._rooms.assign([Place(area.outline, floor_id) for area in areas])
-            nodes.append(_place(floor_id, "B0", span, outline, (Tag(f"floor {i + 1}", 1.0),)))
+            nodes.append(_place(floor_id, "B0", span, extent.outline, (Tag(f"floor {i + 1}", 1.0),)))
             rooms += [HomeRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
         nodes += [_place(room.id, room.floor, room.span, room.area.outline) for room in rooms]
         home = find_homes(objects, rooms)
         nodes += self._fill(rooms, home, objects, world)
         for known in (self._known_rooms, self._known_locations, self._known_footprints):
             known.turn()
-        nodes = _with_frames(nodes)
+        nodes = _with_frames([_building(extents), *nodes])
         placed = _placed(nodes, {f"O{number}": room.id for number, room in zip(world.object_ids, home, strict=True)})
         places = self._connect(world, list(zip(spans, floor_ids, strict=True)), rooms, placed)
         nodes = [replace(node, approach=places.approaches.get(node.id)) for node in nodes]
@@ -95,11 +105,12 @@ class GraphBuilder:
 
     def _find_rooms(
         self, points: Points, free: Points, free_cell_m: float, span: FloorSpan
-    ) -> tuple[Grid, list[RoomArea], F32]:
+    ) -> tuple[Grid, list[RoomArea], _Extent]:
         """Rooms of a floor and its own outline, made again only when its points, free space or heights changed."""
 
-        def make() -> tuple[Grid, list[RoomArea], F32]:
-            return *find_rooms(points, free, free_cell_m, span, self._config.rooms), convex_footprint(points)
+        def make() -> tuple[Grid, list[RoomArea], _Extent]:
+            extent = _Extent(np.asarray(bounding_box(points), float), np.asarray(convex_footprint(points), float))
+            return *find_rooms(points, free, free_cell_m, span, self._config.rooms), extent
 
         return self._known_rooms.get(digest(points, free, free_cell_m, span.low, span.high), make)
 
@@ -155,13 +166,15 @@ def _check(world: Map) -> None:
 
 
 def _in_zone(xyz: Points, span: FloorSpan) -> Points:
-    return xyz[(xyz[:, 2] >= span.zone_low) & (xyz[:, 2] <= span.zone_high)]
+    z = np.ascontiguousarray(xyz[:, 2])
+    return xyz[(z >= span.zone_low) & (z <= span.zone_high)]
 
 
-def _building(points: Points) -> Node:
-    if not len(points):
+def _building(floors: list[_Extent]) -> Node:
+    if not floors:
         return _node("B0", "", np.zeros((2, 3)), np.zeros((0, 2)))
-    return _node("B0", "", bounding_box(points), convex_footprint(points))
+    box = np.array([np.min([one.box[0] for one in floors], axis=0), np.max([one.box[1] for one in floors], axis=0)])
+    return _node("B0", "", box, convex_footprint(np.concatenate([one.outline for one in floors])))
 
 
 def _place(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tuple[Tag, ...] = ()) -> Node:

@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
 F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
 Points = NDArray[np.floating]
 
 
@@ -64,9 +65,10 @@ def find_floors(points_world: Points, camera_positions_world: Points, config: Fl
     if not len(points_world):
         return []
     z = np.asarray(points_world[:, 2], float)
-    slabs = _slabs(_layers(points_world, config), config)
+    plan, cells = _plan_cells(points_world, config)
+    slabs = _slabs(_layers(z, plan, cells, config), config)
     cameras = np.sort(np.asarray(camera_positions_world[:, 2], float))
-    lows = [_ground(points_world, slabs, cameras, config)]
+    lows = [_ground(z, plan, cells, slabs, cameras, config)]
     while True:
         standing = cameras[cameras > lows[-1] + config.camera_max_m]
         if len(standing) < max(1, config.camera_share * len(cameras)):
@@ -78,15 +80,12 @@ def find_floors(points_world: Points, camera_positions_world: Points, config: Fl
     return _spans(lows, slabs, float(np.percentile(z, 99.5)), float(z.min()), float(z.max()), config)
 
 
-def _layers(points: Points, config: FloorConfig) -> list[_Layer]:
+def _layers(z: F64, plan: I64, cells: int, config: FloorConfig) -> list[_Layer]:
     """Strong peaks of covered plan area over height, lowest first."""
-    z = np.asarray(points[:, 2], float)
     bottom = np.floor(z.min() / config.bin_m) - 1
     level = (z / config.bin_m - bottom).astype(np.int64)
-    cells = np.floor(points[:, :2] / config.cell_m).astype(np.int64)
-    cells -= cells.min(axis=0)
-    width, height = cells.max(axis=0) + 1
-    covered = np.unique((level * width + cells[:, 0]) * height + cells[:, 1]) // (width * height)
+    keys = np.sort(level * cells + plan)  # twice as fast as np.unique, and this is most of the floor layer's time
+    covered = keys[np.r_[True, keys[1:] != keys[:-1]]] // cells
     area = np.bincount(covered, minlength=int(level.max()) + 2) * config.cell_m**2
     area = gaussian_filter1d(area.astype(float), config.smooth_m / config.bin_m, mode="constant")
     distance = max(1, round(config.separation_m / config.bin_m))
@@ -95,6 +94,15 @@ def _layers(points: Points, config: FloorConfig) -> list[_Layer]:
         return []
     strong = [p - 1 for p in peaks if area[p - 1] > config.keep_share * area[peaks - 1].max()]
     return [_Layer((p + bottom + 0.5) * config.bin_m, float(area[p])) for p in strong]
+
+
+def _plan_cells(points: Points, config: FloorConfig) -> tuple[I64, int]:
+    """The plan cell (N,) of each point, and how many there are in all."""
+    # a column at a time: along the rows of (N, 2) minima take longer than all the rest
+    x, y = (np.floor(np.asarray(points[:, axis], float) / config.cell_m).astype(np.int64) for axis in (0, 1))
+    x, y = x - x.min(), y - y.min()
+    depth = int(y.max()) + 1
+    return x * depth + y, (int(x.max()) + 1) * depth
 
 
 def _slabs(layers: list[_Layer], config: FloorConfig) -> list[list[_Layer]]:
@@ -113,13 +121,13 @@ def _below(layer: _Layer, cameras: F64, config: FloorConfig) -> int:
     return int(((over > config.camera_min_m) & (over < config.camera_max_m)).sum())
 
 
-def _ground(points: Points, slabs: list[list[_Layer]], cameras: F64, config: FloorConfig) -> float:
+def _ground(z: F64, plan: I64, cells: int, slabs: list[list[_Layer]], cameras: F64, config: FloorConfig) -> float:
     """The lowest layer that someone stood above and that has next to nothing beneath it."""
-    z = points[:, 2]
-    plan = np.floor(points[:, :2] / config.cell_m)
-    seen = len(np.unique(plan, axis=0))
+    lowest = np.full(cells, np.inf)
+    np.minimum.at(lowest, plan, z)
+    seen = np.count_nonzero(lowest < np.inf)
     for layer in (layer for slab in slabs for layer in slab):
-        beneath = len(np.unique(plan[z < layer.height - config.separation_m], axis=0))
+        beneath = np.count_nonzero(lowest < layer.height - config.separation_m)
         if beneath > config.below_share * seen:
             break
         if _below(layer, cameras, config) or not len(cameras):

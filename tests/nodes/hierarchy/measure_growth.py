@@ -30,10 +30,8 @@ def storey(base_m: float) -> np.ndarray:
     width, depth = ROOMS[0] * SIDE_M, ROOMS[1] * SIDE_M
     x, y, z = (np.arange(STEP / 2, size, STEP) for size in (width, depth, CEILING_M))
     parts = [grid_points(x, y, np.array([0.0, CEILING_M]))]
-    parts += [
-        grid_points(np.arange(0, width + 0.1, SIDE_M), y, z),
-        grid_points(x, np.arange(0, depth + 0.1, SIDE_M), z),
-    ]
+    across, along = (np.arange(0, size + 0.1, SIDE_M) for size in (width, depth))
+    parts += [grid_points(across, y, z), grid_points(x, along, z)]
     points = np.concatenate(parts)
     offset = np.abs(points % SIDE_M - SIDE_M / 2)
     on_wall = (np.minimum(points[:, :2] % SIDE_M, -points[:, :2] % SIDE_M) < 1e-6).any(axis=1)
@@ -46,7 +44,7 @@ def furniture(base_m: float, random: np.random.Generator) -> list[np.ndarray]:
     """Boxes of half a metre in every room."""
     box = grid_points(*(np.arange(0, 0.5, 0.025),) * 2, np.array([0.0, 0.25, 0.5]))
     rooms = [(i * SIDE_M, j * SIDE_M) for i in range(ROOMS[0]) for j in range(ROOMS[1])]
-    return [(*box, *(np.array(room) + random.uniform(0.3, 3.2, 2)), base_m) for room in rooms for _ in range(10)]
+    return [box + np.r_[room + random.uniform(0.3, 3.2, 2), base_m] for room in rooms for _ in range(10)]
 
 
 def as_map(revision: int, points: np.ndarray, objects: list[np.ndarray], floors: int) -> Map:
@@ -97,7 +95,7 @@ def main(most: int) -> None:
         more = grid_points(np.arange(1, 1.5, 0.05), np.arange(1, 1.5, 0.05), np.array([STOREY_M * floor + 0.5]))
         for changed in (False, True, False):
             points = np.concatenate((points, more)) if changed else points
-            objects = [*objects, (*more, 0.3, 0.3, 0)] if changed else objects
+            objects = [*objects, more + np.array([0.3, 0.3, 0])] if changed else objects
             world = as_map(revision, points, objects, floor + 1)
             began = time.perf_counter()
             graph = builder.build(world)
