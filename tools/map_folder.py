@@ -1,4 +1,7 @@
-"""What a run leaves behind: graph.json, cloud.ply, objects.ply, trajectory.txt (TUM), run.json; and reading it back."""
+"""What a run leaves behind: graph.json, cloud.ply, objects.ply, retired.json, trajectory.txt (TUM), run.json.
+
+And reading it back.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +26,7 @@ from placegraph.tools.corrected import CorrectedKeyframes
 from placegraph.tools.ply import points_of, read_vertices, write_points
 
 GRAPH, CLOUD, OBJECTS, TRAJECTORY, RUN = "graph.json", "cloud.ply", "objects.ply", "trajectory.txt", "run.json"
+RETIRED = "retired.json"  # objects that were seen to be no longer there
 RGB = ("red", "green", "blue")
 PACKAGES = (
     "placegraph",
@@ -109,8 +113,30 @@ class Collector:
             write_points(folder / CLOUD, self.map.points_world, colors)
             ids = np.repeat(self.map.object_ids, np.diff(self.map.object_point_offsets)).astype(np.int32)
             write_points(folder / OBJECTS, self.map.object_points_world, {"object": ids})
+            (folder / RETIRED).write_text(json.dumps(retired(self.map), indent=1, sort_keys=True) + "\n")
         if self.graph is not None:
             SceneGraph.from_json(self.graph.json).save(folder / GRAPH)
+
+
+def retired(map_: Map) -> list[dict[str, Any]]:
+    """Objects that are no longer there: id, tags with votes, box in metres, the last frame that showed it and `gone`.
+
+    `gone` is the frame that made it certain: enough keyframes had seen through the place.
+    """
+    found = []
+    for i, number in enumerate(map_.retired_ids.tolist()):
+        tags = slice(*map_.retired_tag_offsets[i : i + 2].tolist())
+        votes = zip(map_.retired_tag_names[tags], map_.retired_tag_votes[tags].tolist(), strict=True)
+        found.append(
+            {
+                "id": f"O{number}",
+                "tags": [[name, round(vote, 3)] for name, vote in votes],
+                "box": np.round(map_.retired_boxes_world[i].astype(float), 3).tolist(),
+                "last_seen": int(map_.retired_last_frames[i]),
+                "gone": int(map_.retired_gone_frames[i]),
+            }
+        )
+    return found
 
 
 def prepare(folder: Path) -> None:

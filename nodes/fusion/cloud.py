@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +52,13 @@ class Cloud:
         self._placed_by.update(other._placed_by)
         for submap, (keys, values) in other._parts.items():
             self._keep(submap, keys, values)
+
+    def copy(self) -> Cloud:
+        """A cloud of the same voxels that changes on its own; arrays are never changed in place but for counts."""
+        other = copy(self)
+        other._parts, other._placed_by = dict(self._parts), dict(self._placed_by)
+        other.shown, other.seen_through = self.shown.copy(), self.seen_through.copy()
+        return other
 
     def is_of(self, submaps: Mapping[int, object]) -> bool:
         """Whether some of its points came with one of these submaps."""

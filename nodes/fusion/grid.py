@@ -54,6 +54,17 @@ def share_near(points: F64, tree: cKDTree, reach_m: float) -> float:
     return float(np.isfinite(distance).mean())
 
 
+def spans(points: F64, sides: tuple[F64, F64], reach_m: float) -> bool:
+    """Whether points (N, 3) lie on both of two clouds."""
+    tree = cKDTree(points)
+    return all(share_near(side, tree, reach_m) > 0 for side in sides)
+
+
+def nearer(points: F64, sides: tuple[F64, F64]) -> NDArray[np.bool_]:
+    """Which of points (N, 3) are nearer to the second cloud than to the first."""
+    return np.asarray(cKDTree(sides[1]).query(points)[0] < cKDTree(sides[0]).query(points)[0])
+
+
 def boxes_meet(a: F32, b: F32, reach_m: float) -> bool:
     """Whether two (2, 3) boxes are within reach of each other, along each axis."""
     return bool((a[0] <= b[1] + reach_m).all() and (b[0] <= a[1] + reach_m).all())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from placegraph.nodes.fusion.cloud import Cloud, Ground
 from placegraph.nodes.fusion.clusters import main_clusters
+from placegraph.nodes.fusion.grid import nearer
 from placegraph.nodes.fusion.lift import Observation
 from placegraph.nodes.fusion.sight import SightConfig
 from placegraph.runtime.geometry import bounding_box, yaw_box
@@ -50,6 +52,8 @@ class Instance:
         self.chances = 1  # keyframes that showed it, whether or not it was recognised
         self._in_sight: I64 = np.zeros(0, np.int64)  # its voxels that the latest keyframe saw
         self.absences = 0  # keyframes that saw through most of it since it was last seen
+        self.gaps = 0  # views that showed two things with a gap between them, less those that showed one
+        self.sides: tuple[F64, F64] = (np.zeros((0, 3)), np.zeros((0, 3)))  # as the last such view had them
         self.revision = 0
         self._refresh()
 
@@ -76,6 +80,18 @@ class Instance:
             self.votes[name] = self.votes.get(name, 0.0) + votes
         self.cloud.absorb(other.cloud)
         self._refresh()
+
+    def split(self, number: int) -> Instance:
+        """Give what lies nearer to the second of its sides to a new instance, with the same votes and views."""
+        second = nearer(self.points, self.sides)
+        other = copy(self)
+        other.number, other.votes, other.cloud = number, dict(self.votes), self.cloud.copy()
+        other.cloud.remove(~second)
+        self.cloud.remove(second)
+        for one in (self, other):
+            one.gaps = 0
+            one._refresh()
+        return other
 
     def follow(self) -> None:
         """Lie where the submaps lie now."""

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from scipy.spatial import cKDTree
 
 from placegraph.nodes.fusion.cloud import Ground
-from placegraph.nodes.fusion.grid import Grid, boxes_meet, inside, share_near
+from placegraph.nodes.fusion.grid import Grid, boxes_meet, inside, share_near, spans
 from placegraph.nodes.fusion.instance import Instance
 from placegraph.nodes.fusion.lift import Observation
 from placegraph.nodes.fusion.sight import Sight
@@ -40,6 +40,8 @@ class AssociationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     # departs: two sides of a pole or a board share no point; most of each is this near to the other
     sides_m: float = 0.12
     sides_share: float = 0.8  # of the one; of the other, which may be seen in full, `overlap`
+    split_gap_m: float = 0.1  # departs: between two masks of one view that both lie on one object
+    split_views: int = 3  # departs: so many more views with such a gap than without: it is two objects
     merge_every: int = 10  # keyframes; BBQ: 20
     prune_after: int = 20  # keyframes without a second view; ConceptGraphs drops what has fewer than 3 views
 
@@ -89,9 +91,31 @@ class ObjectMap:
                 self.instances[number].update(observation, *moment)
             taken.setdefault(number, []).append(observation)
             self._grid.put(number, self.instances[number].box)
+        for number, observations in taken.items():
+            self._note_gap(self.instances[number], observations)
         self._note_apart(list(taken))
         if (moment.keyframe + 1) % self._config.merge_every == 0:
             self.tidy(moment.keyframe)
+
+    def _note_gap(self, instance: Instance, observations: list[Observation]) -> None:
+        """Two things that were taken for one are told apart by views that show both, with a gap between them."""
+        c = self._config
+        if len(observations) == 1:
+            instance.gaps -= instance.gaps > 0 and spans(observations[0].points, instance.sides, self._reach_m)
+            return
+        sides = observations[0].points, observations[1].points
+        if self._cosine({observations[0].name: 1.0}, {observations[1].name: 1.0}) < c.same_cosine:
+            return
+        if share_near(sides[0], cKDTree(sides[1]), c.split_gap_m) > 0:
+            return
+        instance.gaps, instance.sides = instance.gaps + 1, sides
+        if instance.gaps >= c.split_views:
+            other = instance.split(self._next)
+            self._next += 1
+            self.instances[other.number] = other
+            for one in (instance, other):
+                self._grid.put(one.number, one.box)
+            self._apart[instance.number, other.number] = c.split_views
 
     def look(self, sight: Sight) -> None:
         """Take what a depth image says of the objects in its view; call it before `add` of the same keyframe."""
@@ -243,8 +267,9 @@ class ObjectMap:
         return float(first @ second) / length
 
     def _note_apart(self, numbers: list[int]) -> None:
+        reach_m = max(self._reach_m, self._config.sides_m)
         for i, first in enumerate(numbers):
             for second in numbers[i + 1 :]:
-                if boxes_meet(self.instances[first].box, self.instances[second].box, self._reach_m):
+                if boxes_meet(self.instances[first].box, self.instances[second].box, reach_m):
                     key = (min(first, second), max(first, second))
                     self._apart[key] = self._apart.get(key, 0) + 1

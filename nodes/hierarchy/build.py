@@ -26,6 +26,7 @@ from placegraph.runtime.messages import Map
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 
 F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
 Points = NDArray[np.floating]
 
 

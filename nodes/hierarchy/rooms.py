@@ -125,8 +125,8 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomCon
         seen[rows[here], columns[here]] = 1
         # a wall seen from a few places has holes: a cell's neighbours stand in for it, and the erosion takes it back
         filled += np.asarray(cv2.dilate(seen, kernel), bool)
-    walls = (filled >= round(config.wall_fill_m / config.level_m)).astype(np.uint8)
-    walls = cv2.erode(cv2.morphologyEx(walls, cv2.MORPH_CLOSE, kernel), kernel)
+    wide = (filled >= round(config.wall_fill_m / config.level_m)).astype(np.uint8)
+    walls = cv2.erode(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, kernel), kernel)
     return walls_of_plan(np.asarray(walls, bool), config)
 
 

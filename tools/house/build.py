@@ -61,8 +61,8 @@ class HouseFrames:
     """The frames of one house along its walk; each is made by itself, so any may be made first, in any process.
 
     moved: so many pieces of furniture are moved after the walk, and the house is walked again, backwards: the second
-    film begins about where the first ended. `before` is the house of the first `frames_before` frames, `house` that of
-    the others.
+    film begins on the floor where the first ended. `before` is the house of the first `frames_before` frames, `house`
+    that of the others.
     """
 
     def __init__(

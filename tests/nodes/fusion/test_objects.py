@@ -154,3 +154,35 @@ def test_comparisons_grow_with_neighbours_and_not_with_all_objects(monkeypatch):
     assert len(objects.instances) == 100 and calls == 0
     objects.add([surface((20.0, 0, 0), (20.2, 0.2, 0.2), "cup")], Moment(101, 101))
     assert calls == 1
+
+
+def test_two_chairs_that_were_taken_for_one_are_told_apart_by_views_with_a_gap(objects):
+    left, right = ((0, 0, 0), (0.5, 0.5, 0.9)), ((0.7, 0, 0), (1.2, 0.5, 0.9))
+    objects.add([surface((0, 0, 0), (1.2, 0.5, 0.9), "chair")], Moment(0, 0))  # one mask over both
+    for k in range(1, 14):
+        objects.add([surface(*left, "chair"), surface(*right, "chair")], Moment(k, k))
+    assert sorted(objects.instances) == [0, 1]
+    for box, expected in zip((objects.instances[0].box, objects.instances[1].box), (left, right), strict=True):
+        assert np.allclose(box, expected, atol=0.13)  # the first mask's bridge is shared out between them
+
+
+def test_one_thing_behind_a_post_stays_one(objects):
+    for k in range(12):
+        halves = [surface((0, 0, 0), (0.8, 0.8, 0.8), "couch"), surface((1.0, 0, 0), (1.8, 0.8, 0.8), "couch")]
+        whole = [surface((0, 0, 0), (1.8, 0.8, 0.8), "couch")]
+        objects.add(whole if k % 2 == 0 else halves, Moment(k, k))
+    assert list(objects.instances) == [0]
+
+
+def test_two_sides_of_a_thin_board_that_share_no_point_become_one(objects):
+    objects.add([surface((0, 0, 0), (0.6, 0.02, 0.9), "lamp")], Moment(0, 0))
+    objects.add([surface((0, 0.1, 0), (0.6, 0.12, 0.9), "lamp")], Moment(1, 1))
+    objects.tidy(1)
+    assert list(objects.instances) == [0]
+
+
+def test_two_cups_that_were_seen_together_are_not_taken_for_two_sides(objects):
+    first, second = ((0, 0, 0), (0.08, 0.08, 0.1)), ((0.12, 0, 0), (0.2, 0.08, 0.1))
+    objects.add([surface(*first, "cup"), surface(*second, "cup")], Moment(0, 0))
+    objects.tidy(0)
+    assert len(objects.instances) == 2

@@ -10,7 +10,7 @@ from placegraph.tools.house.build import DEPTH_STEPS_PER_M, HouseFrames, build
 from placegraph.tools.house.rearrange import LEAST_WAY_M, changed_ids, rearrange
 from placegraph.tools.house.walk import check_reachable
 
-SEED, MOVED = 5, 3
+SEED, MOVED = 5, 6
 
 
 @pytest.fixture(scope="module")
@@ -57,21 +57,22 @@ def test_the_second_film_goes_on_where_the_first_ended(frames: HouseFrames):
     assert np.array_equal(alone.world_from_camera, frames.world_from_camera[:k])
     assert alone.frame(7).color.tobytes() == frames.frame(7).color.tobytes()
     ends = frames.world_from_camera[[k - 1, k], :3, 3]
-    assert np.linalg.norm(ends[1] - ends[0]) < 2.0
+    assert abs(ends[1][2] - ends[0][2]) < 0.1  # on the same floor
 
 
 def frames_of(frames: HouseFrames, pieces: list[int]) -> tuple[list[int], list[int]]:
-    """The frames that show one of the pieces well, and the pieces that both films show well."""
+    """The frames that show a piece well, more of the second film, and the pieces that both films show well."""
     found, judged = set[int](), []
     halves = range(0, frames.frames_before, 4), range(frames.frames_before, frames.count(), 4)
     clear = {i: np.bincount(frames.frame(i).instance.ravel(), minlength=999) for half in halves for i in half}
     for one in pieces:
         best = [
-            sorted((i for i in half if clear[i][one + 1] > 200), key=lambda i: -clear[i][one + 1]) for half in halves
+            sorted((i for i in half if clear[i][one + 1] > 150), key=lambda i: -clear[i][one + 1]) for half in halves
         ]
         if min(map(len, best)) >= 8:
             judged.append(one)
         found |= {i for half in best for i in half[:20]}
+    found |= set(halves[1][::3])  # these show the old places too
     return sorted(found), judged
 
 

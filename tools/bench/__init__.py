@@ -26,6 +26,7 @@ from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.messages import Keyframe
 from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.recording import RecordingWriter
+from placegraph.tools.bench.growth import Sample, drawing, grow, p95_by_floor
 
 IMAGE = {"width": 640, "height": 480}  # what an OAK-D gives
 REPEATS = 30
@@ -212,12 +213,37 @@ def table(costs: list[Cost]) -> str:
     return "\n".join(lines)
 
 
-def bench(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False) -> None:
+def growth_table(samples: list[Sample]) -> str:
+    """A row for each floor: percentiles and mean of what a keyframe took, and the slowest Map with its graph."""
+    rows = ["floor  voxels     p50    p95   mean  slowest, ms a keyframe"]
+    for floor in sorted({one.floor for one in samples}):
+        here = [one for one in samples if one.floor == floor]
+        ms = [one.ms for one in here]
+        p50, p95 = np.percentile(ms, (50, 95))
+        rows.append(f"{floor:5}  {here[-1].voxels:8} {p50:6.1f} {p95:6.1f} {np.mean(ms):6.1f} {max(ms):8.1f}")
+    return "\n".join(rows)
+
+
+def bench(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    growth: Annotated[
+        Path | None, typer.Option(help="Instead: draw (SVG) what keyframes cost as a generated building is mapped.")
+    ] = None,
+    floors: Annotated[int, typer.Option(min=1, help="Of that building.")] = 10,
+    rooms: Annotated[int, typer.Option(min=1, help="Of each of its floors.")] = 20,
+) -> None:
     """Measure each part on this machine: times, and ratios to baselines of the same run. Takes under a minute.
 
     Times are CPU time, for the bus elapsed time, medians of many. They differ between machines; ratios say whether a
     part has become worse.
     """
+    if growth is not None:
+        samples = grow(floors, rooms)
+        growth.write_text(drawing(samples, rooms), encoding="utf-8")
+        p95 = p95_by_floor(samples)
+        document = {"p95_ms": p95, "keyframes": len(samples), "voxels": samples[-1].voxels, "ratio": p95[-1] / p95[0]}
+        print(json.dumps(document, indent=1) if as_json else growth_table(samples))
+        return
     costs = measure()
     if as_json:
         print(json.dumps([asdict(cost) | {"ratio": cost.ratio} for cost in costs], indent=1))
