@@ -215,10 +215,16 @@ def _found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure
 
 
 def _way_to(graph: SceneGraph, node: Node, asker_world: NDArray[np.float64]) -> dict[str, Any]:
-    """Where to stand before a node, and how the asker gets there: rooms and connections in turn, metres."""
+    """Where to stand before a node, and how the asker gets there: rooms and connections in turn, metres.
+
+    To an object that cannot be approached the way into its room, as far as its middle; 0 m for who is there already.
+    """
     approach = approach_to_dict(node.approach)
     found = NO_WAY | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
-    route = find_route(graph, asker_world, node.id) if np.isfinite(asker_world).all() else None
+    if not np.isfinite(asker_world).all():
+        return found
+    room = graph.room_of(node.id)
+    route = find_route(graph, asker_world, node.id) or (find_route(graph, asker_world, room) if room else None)
     if route is None:
         return found
     return found | {"route": list(route.ids), "travel_m": _numbers(route.length_m)}

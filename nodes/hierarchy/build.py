@@ -99,6 +99,8 @@ class GraphBuilder:
         plans = []
         for span, floor_id in floors:
             here = [room for room in rooms if room.floor == floor_id]
+            if not here:
+                continue
             inside, free = _in_zone(points, span), _in_zone(world.free_points_world, span)
             masks = tuple((room.id, room.area.mask) for room in here)
             plans.append(FloorPlan(floor_id, span, here[0].grid, inside, free, masks))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class _Floor:
     ground: Ground
     owner: I32
     openings: list[Opening]
-    made_of: tuple[Points | Bool, ...]  # equal inputs: nothing to compute again
+    made_of: tuple[NDArray[Any], ...]  # equal inputs: nothing to compute again
 
     def at(self, cell: tuple[int, int]) -> F64:
         middle = self.plan.grid.origin + (np.array(cell[::-1]) + 0.5) * self.plan.grid.cell_m
@@ -236,7 +237,7 @@ class PlaceGraphBuilder:
         return found
 
 
-def _equal(one: Sequence[Points | Bool], other: Sequence[Points | Bool]) -> bool:
+def _equal(one: Sequence[NDArray[Any]], other: Sequence[NDArray[Any]]) -> bool:
     return len(one) == len(other) and all(map(np.array_equal, one, other))
 
 
