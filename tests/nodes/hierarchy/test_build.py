@@ -3,6 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from placegraph.nodes.hierarchy import build as build_module
 from placegraph.nodes.hierarchy.build import GraphBuilder, LayerConfig
 from placegraph.runtime.errors import SchemaError
 
@@ -117,3 +118,39 @@ def test_a_floor_without_any_wall_still_has_a_room(make_map):
     lawn = np.stack((x.ravel(), y.ravel(), 0 * x.ravel()), axis=1)
     graph = build(make_map(lawn, [[1, 1, 1.5]]))
     assert len(graph.layer("room")) == 1
+
+
+def growing_maps(make_map, house_points, walk):
+    """A house that is explored: upper floor added, an object added, an object moved, nothing, a wall point added."""
+    late = OBJECTS | {11: ("chair", (5.0, 2.2, 3.0), (5.5, 2.7, 3.9))}
+    moved = late | {7: ("chair", (6.4, 1.0, 0.0), (6.9, 1.5, 0.9))}
+    low, both = house_points(1), house_points(2)
+    more = np.concatenate((both, [[4.0, 1.0, 1.0]]))
+    below = {number: OBJECTS[number] for number in (3, 7)}
+    parts = [(low, walk(1), below), (both, walk(2), OBJECTS), (both, walk(2), late), (both, walk(2), moved)]
+    parts += [(both, walk(2), moved), (more, walk(2), moved)]
+    return [make_map(*part, revision=i) for i, part in enumerate(parts)]
+
+
+def test_what_is_remembered_makes_no_difference(make_map, house_points, walk):
+    maps = growing_maps(make_map, house_points, walk)
+    remembering, forgetting = GraphBuilder(LayerConfig()), GraphBuilder(LayerConfig())
+    for world in maps:
+        for known in (forgetting._known_rooms, forgetting._known_locations, forgetting._known_footprints):
+            known.turn()
+            known.turn()
+        assert remembering.build(world).to_json() == forgetting.build(world).to_json()
+
+
+def test_only_what_changed_is_made_again(make_map, house_points, walk, monkeypatch):
+    made = []
+    for name in ("find_rooms", "find_locations"):
+        real = getattr(build_module, name)
+        monkeypatch.setattr(build_module, name, lambda *a, name=name, real=real: made.append(name) or real(*a))
+    builder, counts = GraphBuilder(LayerConfig()), []
+    for world in growing_maps(make_map, house_points, walk):
+        made.clear()
+        builder.build(world)
+        counts.append((made.count("find_rooms"), made.count("find_locations")))
+    # a move empties one room's place and fills another's; the boxes of objects are points of the cloud here
+    assert counts[3:] == [(1, 2), (0, 0), (1, 0)]

@@ -55,3 +55,19 @@ def test_floors_are_told_apart_by_height():
     spans = [Place(span_footprint(0, 2.6)), Place(span_footprint(3, 5.6))]
     assert known.assign(spans) == ["F0", "F1"]
     assert known.assign([Place(span_footprint(-3, -0.4)), *spans]) == ["F2", "F0", "F1"]
+
+
+def test_a_place_that_falls_into_two_keeps_its_id_once():
+    identities = Identities("L")
+    square = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
+    assert identities.assign([Place(square, "F0")]) == ["L0"]
+    left, right = (Place(square * (0.5, 1) + (x, 0), "F0") for x in (0, 2))
+    assert sorted(identities.assign([left, right])) == ["L0", "L1"]
+
+
+def test_many_places_far_apart_keep_their_ids():
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+    places = [Place(square + np.array([2 * i, 0]), f"F{i % 2}") for i in range(60)]
+    identities = Identities("R")
+    first = identities.assign(places)
+    assert identities.assign(places[::-1]) == first[::-1]
