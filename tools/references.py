@@ -26,15 +26,15 @@ RECORDING, SUMMARY = "house.rec", "house.txt"
 # networks in place of the one pass. The drawn scene's network does the work of each.
 DATAFLOW = Path("flat.toml")
 WALK: dict[str, dict[str, Any]] = {
-    "camera": {"limit": 40, "settings": {"width": 64, "height": 48}},
-    "pose": {"method": "kiss_icp", "stride": 1},
+    "camera": {"limit": 20, "settings": {"width": 112, "height": 84}},
+    "pose": {"stride": 4},
 }
 HOUSE: dict[str, dict[str, Any]] = {
     "camera": {"settings": {"width": 176, "height": 132, "frames": 14}},
     "pose": {"method": "given"},
     "fusion": {"voxel_m": 0.1, "min_observations": 2},
 }
-IN_WALK, IN_HOUSE = ("pose", "keyframe"), ("instances", "fusion", "hierarchy", "grounding")
+IN_WALK, IN_HOUSE = ("pose", "keyframe", "pose_graph"), ("instances", "fusion", "hierarchy", "grounding")
 THREE: dict[str, dict[str, Any]] = {name: {"model": "drawn_scene"} for name in ("tagger", "detector", "segmenter")}
 QUESTIONS = (
     "which chair is closest to the refrigerator", "the book on the table", "the lamp in the corner", "find the piano",
