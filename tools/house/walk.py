@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placegraph.runtime.errors import SourceError
+from placegraph.tools.house.gait import camera_poses, sway
 from placegraph.tools.house.model import Floor, House, Room, Stairs
 from placegraph.tools.house.path import (
     LOOPS_M,
@@ -276,30 +277,9 @@ def _filmed(tour: _Tour, random: np.random.Generator, rate_hz: float) -> Walk:
     ticks = np.arange(len(samples)) * STEP_S
     stamps = np.arange(int(ticks[-1] * rate_hz) + 1) / rate_hz
     x, y, z, heading, speed, tilt = (np.interp(stamps, ticks, column) for column in samples.T)
-    pitch = random.uniform(np.radians(13), np.radians(17)) + tilt + _sway(random, stamps, 8.0, np.radians(3))
-    roll = _sway(random, stamps, 3.0, np.radians(0.5))
+    pitch = random.uniform(np.radians(13), np.radians(17)) + tilt + sway(random, stamps, 8.0, np.radians(3))
+    roll = sway(random, stamps, 3.0, np.radians(0.5))
     pace = np.clip(speed / tour.motion.cruise_mps, 0, 1)
     bob = 0.01 * pace * np.sin(2 * np.pi * 1.6 * stamps + random.uniform(0, 2 * np.pi))
-    world_from_camera = _poses(np.stack((x, y, z + tour.eye_m + bob), axis=1), heading, pitch, roll)
+    world_from_camera = camera_poses(np.stack((x, y, z + tour.eye_m + bob), axis=1), heading, pitch, roll)
     return Walk(np.round(stamps * 1e9).astype(np.int64), world_from_camera)
-
-
-def _sway(random: np.random.Generator, stamps_s: F64, period_s: float, most: float) -> F64:
-    """(N,) a slow sum of three sines, at most `most`."""
-    total = np.zeros(len(stamps_s))
-    for _ in range(3):
-        total += np.sin(2 * np.pi * stamps_s / (period_s * random.uniform(0.7, 1.6)) + random.uniform(0, 2 * np.pi))
-    return total * most / 3
-
-
-def _poses(xyz_world: F64, heading: F64, pitch: F64, roll: F64) -> F64:
-    """(N, 4, 4) world_from_camera of cameras at (N, 3) that look along a heading, `pitch` radians down."""
-    zero = np.zeros_like(heading)
-    ahead = np.stack((np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)), axis=1)
-    right = np.stack((np.sin(heading), -np.cos(heading), zero), axis=1)
-    down = np.cross(ahead, right)
-    c, s = np.cos(roll)[:, None], np.sin(roll)[:, None]
-    made = np.tile(np.eye(4), (len(heading), 1, 1))
-    made[:, :3, :3] = np.stack((c * right + s * down, c * down - s * right, ahead), axis=2)
-    made[:, :3, 3] = xyz_world
-    return made
