@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.pose_graph.level import LevelConfig, find_level
-from placegraph.nodes.pose_graph.loops import LoopConfig, Places
+from placegraph.nodes.pose_graph.loops import Loop, LoopConfig, Places
 from placegraph.nodes.pose_graph.optimise import Edge, Level, optimise
 from placegraph.runtime.geometry import inverse, nearest_rigid, rotation_angle_rad
 from placegraph.runtime.messages import Correction, Keyframe, Message
 from placegraph.runtime.node import Context, Node, NodeConfig
+from placegraph.runtime.registration import logarithm
 
 logger = logging.getLogger(__name__)
 F64 = NDArray[np.float64]
@@ -30,6 +31,10 @@ class PoseGraphConfig(NodeConfig):
     odometry_rad: float = Field(default=0.003, gt=0)
     loop_m: float = Field(default=0.015, gt=0)  # of a verified loop; its own covariance takes errors as independent
     loop_rad: float = Field(default=0.008, gt=0)
+    # a loop that departs from the poses by less waits for others; else those from `slack` keyframes before it on give
+    pull_m: float = Field(default=0.01, ge=0)
+    pull_rad: float = Field(default=0.004, ge=0)
+    slack: int = Field(default=15, ge=0)
     moved_m: float = Field(default=0.02, gt=0)  # a keyframe that moved less than this, and
     moved_rad: float = Field(default=0.005, gt=0)  # turned less, stays where the map has it
     loops: LoopConfig = LoopConfig()
@@ -68,9 +73,11 @@ class PoseGraphNode(Node):
         found = self._places.loops(self._poses, self._walked_m)
         c = self.config
         self._edges += [Edge(one.first, one.second, one.first_from_second, c.loop_m, c.loop_rad, True) for one in found]
-        if found:
-            self._poses = optimise(self._poses, self._edges, self._levels)
-        moved = self._moved() if found else np.zeros(0, np.int64)
+        pulls = [one.first for one in found if self._pulls(one)]
+        if pulls:
+            still = min(pulls) - c.slack
+            self._poses = optimise(self._poses, self._edges, self._levels, still)
+        moved = self._moved() if pulls else np.zeros(0, np.int64)
         self._told[moved] = self._poses[moved]
         self._told[new] = self._poses[new]
         return [
@@ -82,6 +89,12 @@ class PoseGraphNode(Node):
                 moved_world_from_camera=self._poses[moved],
             )
         ]
+
+    def _pulls(self, loop: Loop) -> bool:
+        """Whether a loop says something else than the poses do."""
+        expected = inverse(self._poses[loop.first]) @ self._poses[loop.second]
+        off, c = logarithm(inverse(expected) @ loop.first_from_second), self.config
+        return bool(np.linalg.norm(off[:3]) > c.pull_m or np.linalg.norm(off[3:]) > c.pull_rad)
 
     def _append(self, keyframe: Keyframe) -> None:
         """The new pose continues odometry from where the graph has the last keyframe."""

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
-STILL = 1e-5  # metres, rad: a smaller step ends the iteration
+STILL = 1e-4  # metres, rad: a smaller step ends the iteration
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +41,16 @@ class Level:
     sigma_rad: float
 
 
-def optimise(poses: F64, edges: Sequence[Edge], levels: Sequence[Level], iterations: int = 10) -> F64:
-    """Poses (K, 4, 4) world_from_camera that fit edges and levels best; pose 0 stays.
+def optimise(poses: F64, edges: Sequence[Edge], levels: Sequence[Level], still: int = 1, iterations: int = 10) -> F64:
+    """Poses (K, 4, 4) world_from_camera that fit edges and levels best; the first `still` (at least one) stay.
 
-    Each step solves the normal equations; parameters are a shift and a turn (6,) in each camera's own frame.
+    An edge's `first` is less than its `second`. Each step solves the normal equations; parameters are a shift and a
+    turn (6,) in each camera's own frame.
     """
-    poses = poses.copy()
-    if len(poses) < 2 or not edges:
+    poses, still = poses.copy(), max(1, still)
+    edges = [edge for edge in edges if edge.second >= still]
+    levels = [level for level in levels if level.pose >= still]
+    if not edges:
         return poses
     first, second = (np.array([getattr(e, name) for e in edges]) for name in ("first", "second"))
     measured = np.array([edge.first_from_second for edge in edges])
@@ -55,7 +58,7 @@ def optimise(poses: F64, edges: Sequence[Edge], levels: Sequence[Level], iterati
     robust = np.array([edge.robust for edge in edges])
     for _ in range(iterations):
         rows = [*_edge_blocks(poses, first, second, measured, scale, robust), *_level_blocks(poses, levels)]
-        step = _solve(rows, len(poses))
+        step = _solve(rows, len(poses), still)
         poses[:, :3, 3] += np.einsum("kij,kj->ki", poses[:, :3, :3], step[:, :3])
         poses[:, :3, :3] = poses[:, :3, :3] @ Rotation.from_rotvec(step[:, 3:]).as_matrix()
         if np.abs(step).max() < STILL:
@@ -100,7 +103,7 @@ def _level_blocks(poses: F64, levels: Sequence[Level]) -> list[Block]:
     return [([(at, jacobian * weight[..., None])], residual * weight)]
 
 
-def _solve(blocks: Sequence[Block], count: int) -> F64:
+def _solve(blocks: Sequence[Block], count: int, still: int) -> F64:
     rows, columns, values, rights, offset = [], [], [], [], 0
     for parts, residual in blocks:
         edges, size = residual.shape
@@ -114,11 +117,11 @@ def _solve(blocks: Sequence[Block], count: int) -> F64:
         offset += edges * size
     shape = (offset, 6 * count)
     j = coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape).tocsc()
-    j = j[:, 6:]  # pose 0 is the world
+    j = j[:, 6 * still :]
     normal = (j.T @ j).tocsc()
     normal.setdiag(normal.diagonal() + 1e-9)
     step = spsolve(normal, -(j.T @ np.concatenate(rights)))
-    return np.concatenate((np.zeros(6), np.atleast_1d(step))).reshape(-1, 6)
+    return np.concatenate((np.zeros(6 * still), np.atleast_1d(step))).reshape(-1, 6)
 
 
 def _skew(v: F64) -> F64:
