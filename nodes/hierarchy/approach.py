@@ -57,7 +57,10 @@ def find_stand(target: Target, here: Bool, reached: Bool, ground: Ground, config
     near = here[window] & (gap >= least) & (gap <= config.reach_m)
     clear = _clear(target, ground.tops[window], gap, ground, config)
     middle = (target.middle[:2] - corner) / cell_m - 0.5  # column, row
-    for allowed in (near & reached[window], near & ~reached[window]):
+    # with some room to spare from all else if it can be: what was seen of things is uncertain by a cell or two
+    roomy = ground.clearance_m[window] >= least
+    here_reached = near & reached[window]
+    for allowed in (here_reached & roomy, here_reached, near & ~reached[window]):
         rows, columns = np.nonzero(allowed)
         apart = np.hypot(columns - middle[0], rows - middle[1])
         for k in np.lexsort((columns, rows, apart))[:MOST_TRIED].tolist():

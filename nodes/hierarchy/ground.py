@@ -47,7 +47,7 @@ class TravelConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     stand_m: float = Field(default=0.15, gt=0)  # the camera is that much off its usual height at most: under one step
     stairs_apart_m: float = Field(default=1.0, gt=0)  # climbs whose ends are nearer are one flight of stairs
     stairs_width_max_m: float = Field(default=3.0, gt=0)
-    margin_m: float = Field(default=0.05, ge=0)  # between robot and object when it faces it
+    margin_m: float = Field(default=0.1, ge=0)  # of the robot when it faces an object: two cells
     reach_m: float = Field(default=1.0, gt=0)  # from the robot's middle to the object's footprint at most
 
 

@@ -24,7 +24,7 @@ def target(low, high, z):
     return Target(footprint, np.array([*footprint.mean(axis=0), z]))
 
 
-def stand(thing, walls=(), here=None, reached=None):
+def stand(thing, walls=(), here=None, reached=None, clearance=1.0):
     """walls: (low, high, height in metres) of what stands in the room."""
     tops = np.zeros(GRID.shape, np.uint8)
     free = np.ones(GRID.shape, bool)
@@ -32,7 +32,7 @@ def stand(thing, walls=(), here=None, reached=None):
         tops[boxed(low, high)] = round(height / LEVEL_M)
         free &= ~boxed(np.array(low) - 0.25, np.array(high) + 0.25)
     here = free if here is None else here & free
-    ground = Ground(GRID, 0.0, free, np.zeros(GRID.shape, np.float32), free, tops)
+    ground = Ground(GRID, 0.0, free, np.full(GRID.shape, clearance, np.float32), free, tops)
     found = find_stand(thing, here, here if reached is None else reached, ground, CONFIG)
     return found and (*middles()[found.cell], found.yaw_rad)
 
@@ -76,3 +76,10 @@ def test_a_place_that_can_be_reached_goes_before_a_nearer_one():
 @pytest.mark.parametrize("height", [2.0, 2.5])
 def test_what_hangs_high_is_not_hidden_by_low_things(height):
     assert stand(target((0.9, -0.1), (1.1, 0.1), height), [((0.3, -2), (0.35, 2), 1.2)]) is not None
+
+
+def test_a_roomy_place_goes_before_a_nearer_one_that_barely_fits():
+    ball = target((0.9, -0.1), (1.1, 0.1), 0.1)
+    roomy = np.where(boxed((1.5, -2), (3, 2)), 0.5, CONFIG.robot_radius_m)
+    assert stand(ball, clearance=roomy)[0] >= 1.5
+    assert stand(ball, clearance=CONFIG.robot_radius_m) is not None
