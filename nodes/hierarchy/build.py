@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ class GraphBuilder:
         self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
         self._known_rooms: Unchanged[tuple[Grid, list[RoomArea], _Extent]] = Unchanged()
         self._known_locations: Unchanged[list[LocationArea]] = Unchanged()
-        self._known_footprints: Unchanged[F64] = Unchanged()
+        self._known_footprints: Unchanged[Points] = Unchanged()
 
     def build(self, world: Map) -> SceneGraph:
         """The graph of a Map; rooms and locations are without names. Deterministic in the sequence of maps.
@@ -110,7 +111,7 @@ class GraphBuilder:
             box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
         for i, key in enumerate(digests):
-            footprint = self._known_footprints.get(key, lambda i=i: convex_footprint(objects[i]))  # type: ignore[misc]
+            footprint = self._known_footprints.get(key, partial(convex_footprint, objects[i]))
             nodes.append(_object(i, parent[i], footprint, world))
         return nodes
 
@@ -152,7 +153,7 @@ def _place(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tu
     return _node(node_id, parent, box, outline, tags=tags)
 
 
-def _object(i: int, parent: str, footprint: F64, world: Map) -> Node:
+def _object(i: int, parent: str, footprint: Points, world: Map) -> Node:
     votes = slice(int(world.tag_offsets[i]), int(world.tag_offsets[i + 1]))
     names, weights = world.tag_names[votes], world.tag_votes[votes].tolist()
     return _node(

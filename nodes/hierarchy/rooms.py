@@ -126,8 +126,8 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomCon
         # a wall seen from a few places has holes: a cell's neighbours stand in for it, and the erosion takes it back
         filled += np.asarray(cv2.dilate(seen, kernel), np.uint8)
     walls = (filled >= round(config.wall_fill_m / config.level_m)).astype(np.uint8)
-    walls = cv2.erode(cv2.morphologyEx(walls, cv2.MORPH_CLOSE, kernel), kernel)
-    return walls_of_plan(np.asarray(walls, bool), config)
+    walls = np.asarray(cv2.erode(cv2.morphologyEx(walls, cv2.MORPH_CLOSE, kernel), kernel), np.uint8)
+    return walls_of_plan(walls.astype(bool), config)
 
 
 def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid: Grid, config: RoomConfig) -> Bool:
