@@ -145,7 +145,7 @@ def _floor_row(number: int, floor: FloorRooms, file: Path) -> dict[str, Any]:
     return {
         "floor": number,
         "low_m": round(floor.span.low, 3),
-        "high_m": round(floor.span.high, 3),
+        "high_m": round(floor.span.ceiling, 3),
         "labels": str(file),
         "origin_m": np.round(grid.origin, 3).tolist(),  # of the image's lower left corner
         "cell_m": grid.cell_m,

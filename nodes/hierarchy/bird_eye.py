@@ -35,7 +35,7 @@ def bird_eye(objects: Sequence[Points], span: FloorSpan, band_high: float) -> tu
     objects: points (N, 3) of each, metres, world frame; band_high: share of the floor's height above which nothing
     counts. Channels: highest point of a cell, its lowest point, and the objects' convex footprints with their edges.
     """
-    top = min(band_high * (span.high - span.low), FULL_M)
+    top = min(band_high * (span.ceiling - span.low), FULL_M)
     kept = [xyz[(xyz[:, 2] >= span.low - BELOW_M) & (xyz[:, 2] <= span.low + top)] for xyz in objects]
     kept = [xyz for xyz in kept if len(xyz)]
     grid = _canvas(kept)

@@ -70,7 +70,7 @@ class GraphBuilder:
         if not spans and objects:  # objects without a cloud: the floor is what they stand on
             spans = find_floors(world.object_points_world, world.camera_positions_world, self._config.floors)
         points = world.points_world if len(world.points_world) else world.object_points_world
-        floor_ids = self._floors.assign([Place(span_footprint(s.low, max(s.high, s.low + 0.1))) for s in spans])
+        floor_ids = self._floors.assign([Place(span_footprint(s.low, max(s.ceiling, s.low + 0.1))) for s in spans])
         nodes: list[Node] = []
         rooms: list[HomeRoom] = []
         extents: list[_Extent] = []
@@ -143,7 +143,7 @@ class GraphBuilder:
         self, room: HomeRoom, members: dict[str, list[int]], objects: list[Points], digests: list[bytes]
     ) -> list[LocationArea]:
         mine = members[room.id]
-        key = digest(room.span.low, room.span.high, *(digests[i] for i in mine))
+        key = digest(room.span.low, room.span.ceiling, *(digests[i] for i in mine))
         return self._known_locations.get(
             key,
             lambda: find_locations([objects[i] for i in mine], room.span, self._config.locations, self._detector),
@@ -181,7 +181,7 @@ def _building(floors: list[_Extent]) -> Node:
 
 
 def _place(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tuple[Tag, ...] = ()) -> Node:
-    box = np.array([[*outline.min(axis=0), span.low], [*outline.max(axis=0), span.high]])
+    box = np.array([[*outline.min(axis=0), span.low], [*outline.max(axis=0), span.ceiling]])
     return _node(node_id, parent, box, outline, tags=tags)
 
 

@@ -31,7 +31,10 @@ class FloorConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     keep_share: float = 0.2  # departs: paper .9 (p_h); a user of HOV-SG needed .2 on partial scans
     slab_m: float = 0.6  # DBSCAN eps: ceiling and next floor are one cluster, floor and table (.7) are not
     cell_m: float = 0.1  # plan cells that make up a layer's area
+    rise_share: float = 0.3  # departs: of a layer's area, what it has more than the heights around it: walls have peaks
     storey_m: float = 2.0  # least height from a floor to its ceiling or the next floor
+    # departs: of a floor whose ceiling is not in view, as a camera held level at 1.4 m sees it from 5 m on only
+    ceiling_m: float = 2.5
     camera_min_m: float = 0.15  # a robot's sensor, or a person's hand, above its floor
     camera_max_m: float = 2.2
     below_share: float = 0.1  # of the seen plan area; more than this well below a layer says that it is no floor
@@ -48,6 +51,12 @@ class FloorSpan:
     high: float
     zone_low: float  # points from here
     zone_high: float  # to here are this floor's
+    expected: float = -np.inf  # of a ceiling that was not seen
+
+    @property
+    def ceiling(self) -> float:
+        """Where the floor ends: at its ceiling, or where one is expected, or above that at the highest point."""
+        return max(self.high, self.expected)
 
 
 @dataclass(frozen=True)
@@ -77,7 +86,7 @@ def find_floors(points_world: Points, camera_positions_world: Points, config: Fl
         if upper is None:
             break
         lows.append(upper)
-    return _spans(lows, slabs, float(np.percentile(z, 99.5)), float(z.min()), float(z.max()), config)
+    return _spans(lows, slabs, z, config)
 
 
 def _layers(z: F64, plan: I64, cells: int, config: FloorConfig) -> list[_Layer]:
@@ -89,11 +98,13 @@ def _layers(z: F64, plan: I64, cells: int, config: FloorConfig) -> list[_Layer]:
     area = np.bincount(covered, minlength=int(level.max()) + 2) * config.cell_m**2
     area = gaussian_filter1d(area.astype(float), config.smooth_m / config.bin_m, mode="constant")
     distance = max(1, round(config.separation_m / config.bin_m))
-    peaks, _ = find_peaks(np.r_[0.0, area, 0.0], distance=distance)  # padded: a peak at either end is one too
+    # padded: a peak at either end is one too
+    peaks, found = find_peaks(np.r_[0.0, area, 0.0], distance=distance, prominence=0.0)
     if not len(peaks):
         return []
-    strong = [p - 1 for p in peaks if area[p - 1] > config.keep_share * area[peaks - 1].max()]
-    return [_Layer((p + bottom + 0.5) * config.bin_m, float(area[p])) for p in strong]
+    covered = area[peaks - 1]
+    strong = (covered > config.keep_share * covered.max()) & (found["prominences"] >= config.rise_share * covered)
+    return [_Layer((p + bottom - 0.5) * config.bin_m, float(area[p - 1])) for p in peaks[strong]]
 
 
 def _plan_cells(points: Points, config: FloorConfig) -> tuple[I64, int]:
@@ -147,18 +158,19 @@ def _floor_above(slabs: list[list[_Layer]], least: float, standing: F64, config:
     return None
 
 
-def _spans(
-    lows: list[float], slabs: list[list[_Layer]], top: float, z_min: float, z_max: float, config: FloorConfig
-) -> list[FloorSpan]:
+def _spans(lows: list[float], slabs: list[list[_Layer]], z: F64, config: FloorConfig) -> list[FloorSpan]:
     layers = [layer for slab in slabs for layer in slab]
     margin = config.separation_m / 2  # noise below a floor is that floor's
+    top, z_min, z_max = float(np.percentile(z, 99.5)), float(z.min()), float(z.max())
     spans = []
     for i, low in enumerate(lows):
         last = i + 1 == len(lows)
         limit = top + margin if last else lows[i + 1] - margin
         above = [layer for layer in layers if low + config.storey_m <= layer.height <= limit]
-        # nothing over the strongest layer at storey height or more: the highest thing seen ends the floor
-        high = max(above, key=lambda layer: layer.area).height if above else min(top, limit)
+        # nothing at storey height or more: what was seen ends the floor, of a lower one but for the walls of its stairs
+        seen = top if last else float(np.percentile(z[(z >= low) & (z <= limit)], 98))
+        high = max(above, key=lambda layer: layer.area).height if above else min(seen, limit)
         zone = (z_min if i == 0 else low - margin, z_max if last else limit)
-        spans.append(FloorSpan(low, max(high, low), *zone))
+        expected = -np.inf if above else min(low + config.ceiling_m, limit if not last else np.inf)
+        spans.append(FloorSpan(low, max(high, low), *zone, expected))
     return spans

@@ -46,7 +46,7 @@ class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     compactness: float = 0.25  # paper, C in 4 pi S / P^2 < C (value not stated); a 5:1 strip has .44
     close_m: float = 0.2  # departs: stands for the alpha of the alpha shape
     model: str = ""  # a LocationDetector of the manifest; "": the recipe above
-    min_score: float = Field(default=0.15, ge=0, le=1)  # of the model's masks; chosen on 13 houses kept aside
+    min_score: float = Field(default=0.3, ge=0, le=1)  # of the model's masks; from maps of three houses
     inside_share: float = Field(default=0.5, gt=0, le=1)  # of an object's points in a mask that make it a member
     stand_m: float = 0.4  # an object that begins higher hangs or lies on another: it draws no outline
 
@@ -86,7 +86,7 @@ def _detect(
     if not image.any():
         return []
     found = detector.locate(image)
-    top = span.low + config.band_high * (span.high - span.low)
+    top = span.low + config.band_high * (span.ceiling - span.low)
     banded = [xyz[xyz[:, 2] <= top] for xyz in objects]
     free = {i for i, xyz in enumerate(banded) if len(xyz)}
     areas = []
@@ -108,7 +108,7 @@ def _around(mask_outline: F64, members: list[Points], span: FloorSpan, config: L
 
 
 def _recipe(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:
-    height = span.high - span.low
+    height = span.ceiling - span.low
     low, high = span.low + config.band_low * height, span.low + config.band_high * height
     banded = [xyz[(xyz[:, 2] >= low) & (xyz[:, 2] <= high)] for xyz in objects]
     owner = np.repeat(np.arange(len(objects)), [len(xyz) for xyz in banded])

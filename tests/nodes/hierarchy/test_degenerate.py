@@ -128,7 +128,7 @@ def test_no_frame_and_no_depth_at_all(poses):
 def test_stairs_only():
     climb = [pose((x - 1, 0.5, 0.6 * max(x, 0) + 1.4), 0.0, 0.5) for x in np.arange(0, 4.8, 0.3)]
     _, (floors, rooms) = mapped(STAIRS, climb)
-    assert len(floors) in (1, 2) and floors[0].box[0, 2] == pytest.approx(0.1, abs=0.2)
+    assert len(floors) in (1, 2) and floors[0].box[0, 2] == pytest.approx(0.2, abs=0.2)  # one of the first steps
     assert len(rooms) == len(floors)
 
 
