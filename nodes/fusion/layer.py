@@ -85,7 +85,8 @@ class Layer:
         taken = mine | (self._holders[rows] < MOST_SUBMAPS)
         self._holders[rows[taken & ~mine]] += 1
         self._newest[rows[taken]] = submap
-        self._parts.setdefault(submap, _Part()).pieces.append((keys[taken], sums[taken]))
+        if taken.any():
+            self._parts.setdefault(submap, _Part()).pieces.append((keys[taken], sums[taken]))
         self._sum(rows[taken], sums[taken])
 
     def close(self) -> None:

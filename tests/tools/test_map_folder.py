@@ -1,3 +1,4 @@
+import dataclasses
 import json
 
 import numpy as np
@@ -5,7 +6,8 @@ import pytest
 
 from placegraph.runtime.config import RunConfig, RunSettings, build
 from placegraph.runtime.errors import ConfigError, SchemaError
-from placegraph.runtime.messages import End, Graph, Pose
+from placegraph.runtime.messages import End, Graph, LastKeyframe, Map, Pose
+from placegraph.runtime.node import Context, build_node
 from placegraph.tools.map_folder import (
     Collector,
     find_graph,
@@ -16,6 +18,7 @@ from placegraph.tools.map_folder import (
     read_object_clouds,
     read_run,
     read_trajectory,
+    retired,
     write_run,
     write_trajectory,
 )
@@ -36,6 +39,13 @@ def pose(frame_id, trusted=True, stamp_ns=None):
         frame_id=frame_id, stamp_ns=frame_id * 10**8 if stamp_ns is None else stamp_ns, world_from_camera=matrix,
         trusted=trusted, quality=1.0, residual_m=0.0, innovation_m=0.0, reason="" if trusted else "lost",
     )  # fmt: skip
+
+
+def make_map() -> Map:
+    """The Map of no keyframes, by the real node."""
+    (made,) = build_node("fusion", {}, Context()).step(LastKeyframe(frame_id=-1, stamp_ns=0, keyframes=0))
+    assert isinstance(made, Map)
+    return made
 
 
 def graph(*, final, named):
@@ -167,3 +177,28 @@ def test_points_without_what_a_map_needs_are_named(tmp_path) -> None:
     write_points(tmp_path / "objects.ply", np.zeros((1, 3)), {})
     with pytest.raises(SchemaError, match=r"objects\.ply: not the objects' points"):
         read_object_clouds(tmp_path)
+
+
+def test_what_has_gone_is_listed_with_when_it_was_seen() -> None:
+    empty = make_map()
+    assert retired(empty) == []
+    gone = dataclasses.replace(
+        empty,
+        retired_ids=np.array([4]),
+        retired_boxes_world=np.array([[[0, 0, 0], [1, 2, 0.1234]]], np.float32),
+        retired_last_frames=np.array([70]),
+        retired_gone_frames=np.array([90]),
+        retired_tag_names=("chair", "stool"),
+        retired_tag_votes=np.array([2, 0.5], np.float32),
+        retired_tag_offsets=np.array([0, 2]),
+    )
+    gone.check()
+    assert retired(gone) == [
+        {
+            "id": "O4",
+            "tags": [["chair", 2.0], ["stool", 0.5]],
+            "box": [[0, 0, 0], [1, 2, 0.123]],
+            "last_seen": 70,
+            "gone": 90,
+        }
+    ]

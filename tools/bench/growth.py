@@ -182,10 +182,10 @@ def drawing(samples: list[Sample], rooms: int) -> str:
         f'<text x="{left}" y="34" fill="#999">dots: keyframes; orange: those that gave a Map and a graph of it; '
         "line: 95th percentile of each floor</text>",
     ]
-    for ms in (1, 3, 10, 30, 100, 300, 1000, 3000, 10000):
+    for ms in (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0):
         if np.log10(ms) <= high:
             parts.append(f'<path d="M{left} {y(ms):.1f}h{width}" stroke="#ddd"/>')
-            parts.append(f'<text x="{left - 6}" y="{y(ms) + 4:.1f}" text-anchor="end">{ms}</text>')
+            parts.append(f'<text x="{left - 6}" y="{y(ms) + 4:.1f}" text-anchor="end">{ms:.0f}</text>')
     for k, one in enumerate(samples):
         look = 'r="2.4" fill="#e07b28"' if one.gave else 'r="1.2" fill="#7a8fb0"'
         parts.append(f'<circle cx="{x(k):.1f}" cy="{y(one.ms):.1f}" {look}/>')

@@ -13,7 +13,7 @@ from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.house.furnish import outline
 from placegraph.tools.house.model import NOWHERE, ON_FLOOR, House, Location, PlacedItem
 from placegraph.tools.house.space import grown, inside
-from placegraph.tools.house.walk import check_reachable
+from placegraph.tools.house.walk import ground_of, landing_of
 
 F64 = NDArray[np.float64]
 
@@ -121,3 +121,11 @@ def _without(place: Location, items: Sequence[PlacedItem]) -> Location:
     if members == place.members or not standing:
         return place
     return replace(place, members=members, outline=outline(standing))
+
+
+def check_reachable(house: House, floor_index: int) -> None:
+    """Raise SourceError unless every room and the stairs of a floor can be reached on foot."""
+    here = ground_of(house, house.floors[floor_index])
+    for flight in house.stairs:
+        if floor_index in (flight.floor, flight.floor + 1):
+            landing_of(house, flight, here, up=floor_index > flight.floor)

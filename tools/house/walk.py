@@ -80,7 +80,7 @@ def walk(house: House, seed: int, rate_hz: float = 10.0) -> Walk:
         SourceError: a room or a flight of stairs cannot be reached.
     """
     random = np.random.default_rng([seed, SALT])
-    grounds = [_ground(house, floor) for floor in house.floors]
+    grounds = [ground_of(house, floor) for floor in house.floors]
     start = np.append(_start(house, grounds[0]), house.floors[0].z_m)
     tour = _Tour(house, Motion(start, 0.0, float(random.uniform(0.52, 0.6))), float(random.uniform(*EYE_M)))
     for floor, here in zip(house.floors, grounds, strict=True):
@@ -90,9 +90,9 @@ def walk(house: House, seed: int, rate_hz: float = 10.0) -> Walk:
         flight = next((one for one in house.stairs if one.floor == floor.index), None)
         if flight is None:
             raise SourceError(f"house {house.seed}: no stairs lead from floor {floor.index} to the rooms above it")
-        _survey(tour, floor, here, ways_to(here, _landing(house, flight, here, up=False)))
+        _survey(tour, floor, here, ways_to(here, landing_of(house, flight, here, up=False)))
         above = grounds[floor.index + 1]
-        head = above.middles(np.array([_landing(house, flight, above, up=True)]))[0]
+        head = above.middles(np.array([landing_of(house, flight, above, up=True)]))[0]
         _climb(tour, flight, np.append(head, house.floors[floor.index + 1].z_m))
     return _filmed(tour, random, rate_hz)
 
@@ -121,15 +121,7 @@ def rooms_of_frames(house: House, world_from_camera: F64) -> I64:
     return rooms
 
 
-def check_reachable(house: House, floor_index: int) -> None:
-    """Raise SourceError unless every room and the stairs of a floor can be reached on foot."""
-    here = _ground(house, house.floors[floor_index])
-    for flight in house.stairs:
-        if floor_index in (flight.floor, flight.floor + 1):
-            _landing(house, flight, here, up=floor_index > flight.floor)
-
-
-def _ground(house: House, floor: Floor) -> Ground:
+def ground_of(house: House, floor: Floor) -> Ground:
     """The ground of a floor; every room must be part of what hangs together."""
     made = ground(*free_grid(house, floor.index, cell_m=CELL_M, radius_m=RADIUS_M), CELL_M)
     places = made.middles(np.flatnonzero(made.reachable))
@@ -253,7 +245,7 @@ def _start(house: House, ground: Ground) -> F64:
     return np.asarray(ground.middles(np.array([ground.nearest(room.polygon.mean(axis=0))]))[0])
 
 
-def _landing(house: House, flight: Stairs, ground: Ground, up: bool) -> int:
+def landing_of(house: House, flight: Stairs, ground: Ground, up: bool) -> int:
     """The free cell from which a flight is climbed, or, `up`, onto which one steps at its head."""
     way = (flight.head - flight.foot)[:2] / np.linalg.norm((flight.head - flight.foot)[:2])
     end = flight.head[:2] + 0.35 * way if up else flight.foot[:2] - 0.35 * way

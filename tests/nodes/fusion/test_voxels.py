@@ -1,31 +1,10 @@
 import numpy as np
-import pytest
 
-from placegraph.nodes.fusion.cells import pack, sum_by_key, unpack
 from placegraph.nodes.fusion.voxels import FreeSpace, VoxelMap, depth_edges
-from placegraph.runtime.errors import SchemaError
 
 
 def colors(n, value=10):
     return np.full((n, 3), value, np.uint8)
-
-
-def test_pack_and_unpack_give_the_cell_centre():
-    xyz = np.array([[0.01, -0.01, 7.32], [-3.0, 0.05, -0.05]])
-    assert np.allclose(unpack(pack(xyz, 0.05), 0.05), [[0.025, -0.025, 7.325], [-2.975, 0.075, -0.025]])
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
-def test_points_that_cannot_be_packed_are_refused(bad):
-    with pytest.raises(SchemaError, match="not finite or more than"):
-        pack(np.array([[0.0, bad, 0.0]]), 0.05)
-
-
-def test_sum_by_key_of_nothing_and_of_shared_keys():
-    keys, sums = sum_by_key(np.zeros(0, np.int64), np.zeros((0, 2)))
-    assert keys.shape == (0,) and sums.shape == (0, 2)
-    keys, sums = sum_by_key(np.array([7, 3, 7]), np.array([[1.0], [10], [2]]))
-    assert keys.tolist() == [3, 7] and sums.tolist() == [[10], [3]]
 
 
 def test_empty_map():
@@ -90,3 +69,48 @@ def test_carving_again_adds_nothing():
     once = FreeSpace(0.1, 0.5, 0.15)
     once.carve(np.array([0.0, 0.0, 1.0]), np.array([[3.0, 1.0, 0.0]]))
     assert count == len(once) > 20
+
+
+def turned(degrees, shift):
+    pose = np.eye(4)
+    angle = np.radians(degrees)
+    pose[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    pose[:3, 3] = shift
+    return pose
+
+
+def test_a_submap_that_is_moved_and_moved_back_leaves_no_trace():
+    random = np.random.default_rng(1)
+    voxels, still = VoxelMap(0.05, keep=True), VoxelMap(0.05, keep=True)
+    for submap in range(3):
+        xyz, rgb = random.uniform(0, 1, (3000, 3)), random.integers(0, 255, (3000, 3)).astype(np.uint8)
+        for one in (voxels, still):
+            one.fuse(xyz, rgb, submap)
+    voxels.move(1, turned(10, (0.3, 0, 0)))
+    assert not np.array_equal(voxels.points(), still.points())
+    voxels.move(1, np.eye(4))
+    assert np.array_equal(voxels.sums[voxels.live()], still.sums[still.live()])
+    assert np.array_equal(voxels.points(), still.points())
+
+
+def test_moved_free_space_neither_grows_nor_shrinks():
+    free = FreeSpace(0.1, 0.5, 0.15, keep=True)
+    ends = np.array([[3.0, y, z] for y in np.linspace(-2, 2, 60) for z in (0.3, 0.8)])
+    free.carve(np.array([0.0, 0.0, 0.6]), ends)
+    before = len(free)
+    free.move(0, turned(30, (0.05, 0.02, 0)))
+    assert abs(len(free) - before) < 0.1 * before
+
+
+def test_removed_voxels_do_not_come_back_with_a_submap_that_moves():
+    voxels = VoxelMap(0.05, keep=True)
+    xyz = np.stack((np.arange(0.025, 2, 0.05), np.zeros(40), np.zeros(40)), axis=1)
+    for submap in (0, 1):
+        voxels.fuse(xyz, colors(40), submap)
+    voxels.remove(np.arange(10))
+    assert len(voxels) == 30
+    for submap in (0, 1):
+        voxels.move(submap, turned(0, (0, 1.0, 0)))
+    assert len(voxels) == 30 and voxels.points()[:, 0].min() > 0.5
+    voxels.fuse(xyz, colors(40), 2)  # it is there again
+    assert len(voxels) == 70

@@ -7,8 +7,7 @@ from placegraph.runtime.geometry import box_iou
 from placegraph.runtime.messages import Keyframe, LastKeyframe, Segments
 from placegraph.runtime.node import Context
 from placegraph.tools.house.build import DEPTH_STEPS_PER_M, HouseFrames, build
-from placegraph.tools.house.rearrange import LEAST_WAY_M, changed_ids, rearrange
-from placegraph.tools.house.walk import check_reachable
+from placegraph.tools.house.rearrange import LEAST_WAY_M, changed_ids, check_reachable, rearrange
 
 SEED, MOVED = 5, 6
 
