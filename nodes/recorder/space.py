@@ -12,7 +12,7 @@ from placegraph.runtime import messages as m
 MAX_POINTS = 100_000  # drawn; the exact cloud lies in /messages
 POINT_RADIUS_M = 0.012
 OVERHEAD_M = 0.2  # over the camera
-TRUSTED, DOUBTED = (90, 200, 255), (255, 80, 60)
+TRUSTED, DOUBTED, CORRECTED = (90, 200, 255), (255, 80, 60), (120, 255, 120)
 
 
 def draw_world(picture: Picture) -> None:
@@ -43,7 +43,7 @@ def draw_pose(picture: Picture, pose: m.Pose, pngs: dict[str, bytes]) -> None:
 
 
 def draw_map(picture: Picture, map_: m.Map, pngs: dict[str, bytes]) -> None:
-    """The cloud in its own colours and one named box for each object; both replace the former ones.
+    """The cloud in its own colours, keyframes and one named box for each object; all replace the former ones.
 
     What lies over the camera's highest place has an entity of its own, which the opening view hides: one looks into
     the rooms from above, and a ceiling would cover them.
@@ -54,6 +54,8 @@ def draw_map(picture: Picture, map_: m.Map, pngs: dict[str, bytes]) -> None:
     for path, part in (("world/map", points[:, 2] <= over_m), ("world/overhead", points[:, 2] > over_m)):
         radius_m = max(POINT_RADIUS_M, map_.voxel_m / 2)
         picture.log(path, rr.Points3D(points[part], colors=colors[part], radii=radius_m))
+    # the path as it was seen, "world/path", stays where odometry had it; this one moves with the map
+    picture.log("world/keyframes", rr.LineStrips3D([map_.camera_positions_world], colors=[CORRECTED], radii=[0.012]))
     picture.replace("objects", {f"world/objects/O{i}": box for i, box in _object_boxes(map_)})
 
 
