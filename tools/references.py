@@ -21,13 +21,19 @@ from placegraph.tools.run import with_settings
 FOLDER = Path(__file__).parents[1] / "tests" / "replay"
 RECORDING, SUMMARY = "house.rec", "house.txt"
 
-# Three runs, which stay under 2 MB together: many small images of configs/flat.toml, since odometry needs small steps;
+# Three runs, which stay under 2 MB together: some images of configs/flat.toml in small steps, which odometry needs;
 # a few larger ones along the whole walk, since networks need large things; and on those again the paper's three
 # networks in place of the one pass. The drawn scene's network does the work of each.
 DATAFLOW = Path("flat.toml")
 WALK: dict[str, dict[str, Any]] = {
-    "camera": {"limit": 20, "settings": {"width": 112, "height": 84}},
+    "camera": {"limit": 10, "settings": {"width": 160, "height": 120}},
     "pose": {"stride": 4},
+    "keyframe": {"translation_m": 0.05},
+    "pose_graph": {  # so that it closes loops within a few steps of small images
+        "pull_m": 0.0,
+        "pull_rad": 0.0,
+        "loops": {"skip": 1, "apart": 1, "features": {"least_inliers": 10}},
+    },
 }
 HOUSE: dict[str, dict[str, Any]] = {
     "camera": {"settings": {"width": 176, "height": 132, "frames": 14}},

@@ -14,12 +14,13 @@ HERE = Path(__file__).parent
 TAKERS = sorted(name for name, kind in node_types().items() if kind.takes)
 # One setting of each node that must show in what it gives: proof that the comparison can fail.
 CHANGED: dict[str, dict[str, Any]] = {
-    "pose": {"voxel_m": 0.11},
+    "pose": {"rgbd": {"track": {"window_px": 15}}},
     "keyframe": {"translation_m": 0.16, "rotation_rad": 0.16},
     "instances": {"max_objects": 1},
     "tagger": {"max_objects": 1},
     "detector": {"max_objects": 1},
     "segmenter": {"max_objects": 1},
+    "pose_graph": {"loop_m": 0.1, "loop_rad": 0.1},
     "fusion": {"edge_ratio": 0.06},
     "hierarchy": {"floors": {"bin_m": 0.02}},
     "grounding": {"use_model": False},
