@@ -41,6 +41,9 @@ class FusionConfig(NodeConfig):
     # departs: of the keyframes that showed an object, those that must have recognised it. Of house 9002's 156 objects
     # 18 have less, 17 of them wrong
     recognised_share: float = Field(default=0.5, ge=0, le=1)
+    # of its strongest name, in the mean of the views that recognised it: scores are the detector's, so it is for a
+    # dataflow to say from where on they are to be believed
+    least_score: float = Field(default=0.0, ge=0, le=1)
     lift: LiftConfig = LiftConfig()
     association: AssociationConfig = AssociationConfig()
     sight: SightConfig = SightConfig()
@@ -136,7 +139,8 @@ class FusionNode(Node):
 
     def _is_stable(self, one: Instance) -> bool:
         c = self.config
-        return one.observations >= max(c.min_observations, c.recognised_share * one.chances)
+        seen_enough = one.observations >= max(c.min_observations, c.recognised_share * one.chances)
+        return seen_enough and max(one.votes.values()) >= c.least_score * one.observations
 
     def _map(self, final: bool) -> Map:
         c = self.config

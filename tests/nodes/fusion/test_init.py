@@ -134,3 +134,16 @@ def test_points_beyond_the_trusted_range_only_prove_free_space(view):
     distance = np.linalg.norm(final.points_world[:, None] - eyes, axis=2).min(axis=1)
     assert len(final.free_points_world) > 50
     assert len(distance) == 0 or distance.max() < 1.4
+
+
+def test_objects_that_their_views_doubt_are_not_in_the_map(view):
+    views = [
+        (keyframe, dataclasses.replace(segments, scores=np.where(np.array(segments.names) == "cup", 0.2, 0.8).astype(np.float32)))
+        for keyframe, segments in circle(view, 6)
+    ]  # fmt: skip
+
+    def names(least_score):
+        final = feed(make(least_score=least_score), views)[-1]
+        return sorted({final.tag_names[i] for i in final.tag_offsets[:-1]})
+
+    assert names(0.0) == ["chair", "cup", "table"] and names(0.3) == ["chair", "table"] and names(0.9) == []
