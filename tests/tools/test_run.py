@@ -12,7 +12,8 @@ from placegraph.runtime.scene_graph import SceneGraph
 
 def test_a_map_folder_holds_all_that_the_run_found(mapped) -> None:
     names = {path.name for path in mapped.iterdir()}
-    assert names == {"graph.json", "cloud.ply", "objects.ply", "trajectory.txt", "run.json", "run.rrd"}
+    files = {"graph.json", "cloud.ply", "objects.ply", "retired.json", "trajectory.txt", "run.json", "run.rrd"}
+    assert names == files
     graph = SceneGraph.load(mapped / "graph.json")
     assert graph.to_json() + "\n" == (mapped / "graph.json").read_text()
     assert len(graph.layer("floor")) == 1 and len(graph.layer("room")) >= 1

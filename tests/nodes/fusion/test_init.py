@@ -137,10 +137,10 @@ def test_points_beyond_the_trusted_range_only_prove_free_space(view):
 
 
 def test_objects_that_their_views_doubt_are_not_in_the_map(view):
-    views = [
-        (keyframe, dataclasses.replace(segments, scores=np.where(np.array(segments.names) == "cup", 0.2, 0.8).astype(np.float32)))
-        for keyframe, segments in circle(view, 6)
-    ]  # fmt: skip
+    views = []
+    for keyframe, segments in circle(view, 6):
+        scores = np.where(np.array(segments.names) == "cup", 0.2, 0.8).astype(np.float32)
+        views.append((keyframe, dataclasses.replace(segments, scores=scores)))
 
     def names(least_score):
         final = feed(make(least_score=least_score), views)[-1]
