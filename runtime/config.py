@@ -123,8 +123,12 @@ def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
     assert isinstance(source, Source)
     given = sorted({kind.__name__ for node in nodes.values() for kind in node.gives})
     context = base.model_copy(update={"lossless": source.is_lossless(), "given": tuple(given)})
+    source.context = context
     # once more, now that it is known what is given: some nodes take a kind only if another gives it
-    nodes = {name: build_node(name, settings, context) for name, settings in config.nodes.items()}
+    nodes = {
+        name: nodes[name] if name == sources[0] else build_node(name, settings, context)
+        for name, settings in config.nodes.items()
+    }
     dataflow = Dataflow(config, context, {name: nodes[name] for name in _order(nodes)})
     _check_wiring(dataflow)
     return dataflow

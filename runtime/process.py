@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import cv2
 import msgpack
 import psutil
 from pydantic import BaseModel, ConfigDict
@@ -251,6 +252,7 @@ def main() -> int:
     node: Node | None = None
     status = 1
     try:
+        cv2.setNumThreads(spec.context.threads)
         node = build_node(spec.node, spec.settings, spec.context)
         node.start()
         process = Process(spec, node)

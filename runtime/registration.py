@@ -92,13 +92,11 @@ class Laid:
 
 @dataclass(frozen=True, eq=False)
 class Registered:
-    """A pose (4, 4), which corners agree with it (N,), what share of the points met, how loosely the data hold it."""
+    """A pose (4, 4), which corners agree with it (N,), and what share of the points met the surface."""
 
     reference_from_camera: F64
     inlier: Bool
     met: float
-    sigma_m: float
-    sigma_rad: float
 
 
 def register(
@@ -123,10 +121,8 @@ def register(
         camera_from_reference = exponential(step) @ camera_from_reference
         if np.abs(step).max() < STILL:
             break
-    spread = np.linalg.inv(matrix + 1e-9 * np.eye(6))
-    sigma_m, sigma_rad = (float(np.sqrt(np.linalg.eigvalsh(part)[-1])) for part in (spread[:3, :3], spread[3:, 3:]))
     pose = nearest_rigid(inverse(camera_from_reference))
-    return Registered(pose, squares < config.inlier_sigmas**2, met, sigma_m, sigma_rad)
+    return Registered(pose, squares < config.inlier_sigmas**2, met)
 
 
 def project(xyz: F64, intrinsics: F64, reference_from_camera: F64) -> F64:

@@ -51,7 +51,7 @@ class FusionConfig(NodeConfig):
 
 
 class FusionNode(Node):
-    """Keyframes and segments to Maps: one every `map_every` keyframes, and a final one.
+    """Keyframes and segments to Maps: one every `map_every` keyframes, rarer in a long run, and a final one.
 
     Where a pose graph gives Corrections, keyframes are fused where it puts them, and the map moves when it does.
     """
@@ -72,6 +72,7 @@ class FusionNode(Node):
         self._free = FreeSpace(config.free_cell_m, config.free_height_m, config.free_clearance_m, moves)
         ground = Ground(config.lift.voxel_m, self._submaps.world_from_fused if moves else None)
         self._objects = ObjectMap(TextEncoder().encode, ground, config.association)
+        self._moves: list[Correction] = []  # that are not followed yet, in order
         self._latest: Message | None = None  # whose frame id and stamp the next Map carries
         self._last: LastKeyframe | None = None
         self._revision = 0
@@ -86,6 +87,8 @@ class FusionNode(Node):
         if isinstance(message, LastKeyframe):
             self._last = message
         else:
+            if isinstance(message, Correction) and len(message.moved_frame_ids):
+                self._moves.append(message)
             joined = self._join.add(message)
             if joined is None:
                 return maps
@@ -102,7 +105,7 @@ class FusionNode(Node):
     def _fuse(self, keyframe: Message, segments: Message, correction: Message | None = None) -> None:
         assert isinstance(keyframe, Keyframe) and isinstance(segments, Segments)
         if isinstance(correction, Correction):
-            self._move(correction)
+            self._move_up_to(correction.frame_id)
             keyframe = replace(keyframe, world_from_camera=correction.world_from_camera)
         pose = keyframe.world_from_camera
         if not is_rigid(pose):
@@ -117,6 +120,13 @@ class FusionNode(Node):
         self._objects.add(lift(keyframe, depth_m, edges, segments, self.config.lift), moment)
         self._objects.retire(self.config.sight.views, keyframe.frame_id)
         self._latest = keyframe
+
+    def _move_up_to(self, frame_id: int) -> None:
+        """Follow all moves so far, also those told with a keyframe whose segments were lost with a process (live)."""
+        due = [one for one in self._moves if one.frame_id <= frame_id]
+        self._moves = self._moves[len(due) :]
+        for correction in due:
+            self._move(correction)
 
     def _move(self, correction: Correction) -> None:
         moves = self._submaps.move(correction)

@@ -57,6 +57,10 @@ class Instance:
         self.revision = 0
         self._refresh()
 
+    def look_away(self) -> None:
+        """The next keyframe may not show it: what the last one saw is no longer in sight."""
+        self._in_sight = self._in_sight[:0]
+
     def update(self, seen: Observation, keyframe: int, frame_id: int, submap: int = 0) -> None:
         """Add one view; a second mask of the same keyframe adds points and votes but is no further observation."""
         if keyframe != self.last_keyframe:

@@ -75,6 +75,7 @@ class ObjectMap:
         self._vectors: dict[str, F32] = {}
         self._grid = Grid()
         self._apart: dict[tuple[int, int], int] = {}  # views that showed both as separate things
+        self._looked_at: list[int] = []  # by the last keyframe
         self._checked: dict[int, int] = {}  # the revision at which an instance was last compared for merging
 
     def add(self, seen: Sequence[Observation], moment: Moment) -> None:
@@ -119,9 +120,14 @@ class ObjectMap:
 
     def look(self, sight: Sight) -> None:
         """Take what a depth image says of the objects in its view; call it before `add` of the same keyframe."""
+        for number in self._looked_at:
+            if number in self.instances:
+                self.instances[number].look_away()
+        self._looked_at = []
         for number in self._grid.near(sight.box, 0.0):
             instance = self.instances[number]
             if sight.box_in_view(instance.box):
+                self._looked_at.append(number)
                 instance.look(*sight.judge(instance.points), sight.config)
                 self._grid.put(number, instance.box)
 

@@ -168,7 +168,8 @@ def _spans(lows: list[float], slabs: list[list[_Layer]], z: F64, config: FloorCo
         limit = top + margin if last else lows[i + 1] - margin
         above = [layer for layer in layers if low + config.storey_m <= layer.height <= limit]
         # nothing at storey height or more: what was seen ends the floor, of a lower one but for the walls of its stairs
-        seen = top if last else float(np.percentile(z[(z >= low) & (z <= limit)], 98))
+        between = z[(z >= low) & (z <= limit)]
+        seen = top if last else float(np.percentile(between, 98)) if len(between) else low
         high = max(above, key=lambda layer: layer.area).height if above else min(seen, limit)
         zone = (z_min if i == 0 else low - margin, z_max if last else limit)
         expected = -np.inf if above else min(low + config.ceiling_m, limit if not last else np.inf)

@@ -88,8 +88,10 @@ class PoseNode(Node):
     def _release(self) -> list[Message]:
         """Decide which way is up from the frames so far and give their poses."""
         waiting, self._waiting = self._waiting, []
-        if self._world_from_start is None and waiting:
-            trusted = [(pose.world_from_camera, up, points) for pose, up, points in waiting if pose.trusted]
+        trusted = [(pose.world_from_camera, up, points) for pose, up, points in waiting if pose.trusted]
+        if not trusted:  # still dark: up is decided by frames to come
+            return [pose for pose, _, _ in waiting]
+        if self._world_from_start is None:
             found = gravity.find_up(trusted, self.config.seed, np.deg2rad(self.config.mount_roll_deg))
             logger.info("up is %s in the start frame, from %s", np.round(found.up, 3).tolist(), found.source)
             if not found.reliable:

@@ -74,9 +74,9 @@ class RgbdOdometry:
             return self._untrusted(f"{track.inliers} of the tracked corners agree ({track.share:.0%})", measured)
         if self._since_ns is not None:  # coasted: does an earlier view tell how far it went astray?
             self._since_ns = None
-            recognised = self._recognise(view, list(self._places)[-c.tries :])
+            recognised = self._recognise(view, list(self._places)[: -c.tries - 1 : -1])
             if recognised is not None:
-                self._pose, self._delta = recognised, inverse(self._pose) @ pose
+                self._pose, self._delta, self._span_ns = recognised, inverse(self._pose) @ pose, span_ns
                 self._tracker.accept(view, recognised)
                 return _trusted(recognised, measured)
         self._move(pose, span_ns)
@@ -95,7 +95,7 @@ class RgbdOdometry:
     def _search(self, view: View) -> dict[str, Any]:
         """Look for a lost camera among the places: the newest ones first, then in turn through all of them."""
         places, c = list(self._places), self._config
-        newest = places[-c.tries // 2 :]
+        newest = places[: -(c.tries // 2) - 1 : -1]
         others = [places[(self._turn + k) % len(places)] for k in range(c.tries - len(newest))]
         self._turn += len(others)
         pose = self._recognise(view, [*newest, *others])
@@ -110,7 +110,7 @@ class RgbdOdometry:
         if not places:
             return None
         seen = describe(view.gray, view.depth_m, view.intrinsics, self._config.features)
-        for features, pose in reversed(places):
+        for features, pose in places:
             found = relate(features, seen, self._config.features)
             if found is not None:
                 return nearest_rigid(pose @ found.reference_from_camera)

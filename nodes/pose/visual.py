@@ -36,7 +36,7 @@ U8 = NDArray[np.uint8]
 
 
 class TrackConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """Lengths in pixels are those of an image 640 wide and scale with it."""
+    """Distances and patches are those of an image 640 pixels wide and scale with it; windows of the search do not."""
 
     corners: int = Field(default=400, ge=20)
     corner_distance_px: float = 14.0
@@ -75,8 +75,6 @@ class Track:
     inliers: int
     share: float
     met: float  # share of the view's points that lie on the reference's surface
-    sigma_m: float  # how loosely the data hold the pose, in the worst direction
-    sigma_rad: float
     uv: F32  # (N, 2) of the landmarks that agree
     landmarks: NDArray[np.int64]  # (N,) which those are
 
@@ -111,8 +109,6 @@ class Tracker:
             inliers=int(found.inlier.sum()),
             share=float(found.inlier.mean()) if len(found.inlier) else 0.0,
             met=found.met,
-            sigma_m=found.sigma_m,
-            sigma_rad=found.sigma_rad,
             uv=uv[kept][inlier],
             landmarks=np.flatnonzero(kept)[inlier],
         )
@@ -148,7 +144,7 @@ class Tracker:
             return Corners(np.zeros((0, 3)), np.zeros((0, 2), np.float32), np.zeros(0))
         last, pose = self._last
         height, width = view.gray.shape
-        side = round(c.patch_px * width / 640)
+        side = max(8, round(c.patch_px * width / 640))  # half of it is the least window that OpenCV takes
         v, u = np.mgrid[side // 2 : height : side, side // 2 : width : side]
         uv = np.stack((u.ravel(), v.ravel()), axis=1).astype(np.float32)
         inverse_depth = inverse_depth_at(last.depth_m, uv)

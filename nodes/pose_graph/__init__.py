@@ -1,6 +1,7 @@
 """Pose graph: keyframes to Corrections; closes loops and moves what odometry has placed wrongly.
 
-Odometry never waits for it: it takes keyframes, and its poses matter to the map alone.
+Odometry does not need it: its poses matter to the map alone. Only when it is behind by more keyframes than the windows
+of the bus hold (runtime/topics.py) does it hold up what comes before it.
 """
 
 from __future__ import annotations
@@ -23,12 +24,17 @@ from placegraph.runtime.registration import logarithm
 logger = logging.getLogger(__name__)
 F64 = NDArray[np.float64]
 
+PATIENCE = 40  # moving so many keyframes waits for one more keyframe the next time: a long run's steps stay short
+
 
 class PoseGraphConfig(NodeConfig):
     """Sigmas of what the graph is made of, and when the map is told."""
 
-    odometry_m: float = Field(default=0.004, gt=0)  # of a step between keyframes, departs: from the house's walks
+    # of a step between keyframes, departs: from the house's walks; in a longer step errors add up as a random walk's do
+    odometry_m: float = Field(default=0.004, gt=0)
     odometry_rad: float = Field(default=0.003, gt=0)
+    step_m: float = Field(default=0.15, gt=0)
+    step_rad: float = Field(default=0.15, gt=0)
     loop_m: float = Field(default=0.015, gt=0)  # of a verified loop; its own covariance takes errors as independent
     loop_rad: float = Field(default=0.008, gt=0)
     # a loop that departs from the poses by less waits for others; else those from `slack` keyframes before it on give
@@ -57,27 +63,30 @@ class PoseGraphNode(Node):
         self._poses = np.zeros((0, 4, 4))  # as optimised
         self._told = np.zeros((0, 4, 4))  # as the map has them
         self._walked_m = np.zeros(0)
+        self._pulling: list[int] = []  # first keyframes of loops that the poses have not given way to yet
+        self._next = 0  # keyframe number from which on they may
         self._edges: list[Edge] = []
         self._levels: list[Level] = []
 
     def step(self, message: Message) -> Sequence[Message]:
         """Add a keyframe, look for loops, and say where it is; after a loop also who moved."""
         assert isinstance(message, Keyframe)
-        self._places.add(message)
         self._append(message)
-        new = len(self._poses) - 1
-        surface = self._places.features[new].surface(self.config.loops.features.surface)
-        level = find_level(surface, self._poses[new], self.config.level)
-        if level is not None:
-            self._levels.append(Level(new, level, self.config.level.sigma_rad))
-        found = self._places.loops(self._poses, self._walked_m)
-        c = self.config
+        c, new = self.config, len(self._poses) - 1
+        seen = self._places.add(message, self._poses[new])
+        found: list[Loop] = []
+        if seen is not None:
+            level = find_level(seen.surface(c.loops.features.surface), self._poses[new], c.level)
+            if level is not None:
+                self._levels.append(Level(new, level, c.level.sigma_rad))
+            found = self._places.loops(self._poses, self._walked_m)
         self._edges += [Edge(one.first, one.second, one.first_from_second, c.loop_m, c.loop_rad, True) for one in found]
-        pulls = [one.first for one in found if self._pulls(one)]
-        if pulls:
-            still = min(pulls) - c.slack
+        moved = np.zeros(0, np.int64)
+        self._pulling += [one.first for one in found if self._pulls(one)]
+        if self._pulling and new >= self._next:
+            still = min(self._pulling) - c.slack
             self._poses = optimise(self._poses, self._edges, self._levels, still)
-        moved = self._moved() if pulls else np.zeros(0, np.int64)
+            moved, self._pulling, self._next = self._moved(), [], new + (new - max(0, still)) // PATIENCE
         self._told[moved] = self._poses[moved]
         self._told[new] = self._poses[new]
         return [
@@ -103,9 +112,12 @@ class PoseGraphNode(Node):
         if self._odometry:
             last_from_new = inverse(self._odometry[-1]) @ given
             pose = nearest_rigid(self._poses[-1] @ last_from_new)
-            walked_m = float(self._walked_m[-1] + np.linalg.norm(last_from_new[:3, 3]))
+            moved_m, turned_rad = float(np.linalg.norm(last_from_new[:3, 3])), rotation_angle_rad(last_from_new[:3, :3])
+            walked_m = float(self._walked_m[-1]) + moved_m
+            steps = max(1.0, moved_m / c.step_m, turned_rad / c.step_rad)
+            sigmas = c.odometry_m * np.sqrt(steps), c.odometry_rad * np.sqrt(steps)
             last = len(self._poses) - 1
-            self._edges.append(Edge(last, last + 1, last_from_new, c.odometry_m, c.odometry_rad, False))
+            self._edges.append(Edge(last, last + 1, last_from_new, *sigmas, False))
         self._frame_ids.append(keyframe.frame_id)
         self._odometry.append(given)
         self._poses, self._told = (np.concatenate((poses, pose[None])) for poses in (self._poses, self._told))

@@ -29,6 +29,8 @@ LAYOUT = (8, 6)  # cells of the colour layout, columns and rows
 class LoopConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """Where to look for loops."""
 
+    still_m: float = 0.03  # a keyframe that moved less than this and turned less than that since the last one that was
+    still_rad: float = 0.03  # remembered is not: a robot that stands for a night fills no memory
     skip: int = Field(default=3, ge=1)  # the last so many keyframes are odometry's own
     reach_m: float = 1.5  # between positions of two views that can be matched
     drift_share: float = 0.01  # ... and so much more for every metre walked since
@@ -59,29 +61,39 @@ class Places:
     """All keyframes so far, by number, as what is needed to recognise them."""
 
     config: LoopConfig
-    features: list[Features] = field(default_factory=list)
+    features: list[Features | None] = field(default_factory=list)  # None: not remembered
     layouts: list[F32] = field(default_factory=list)
+    _last: F64 | None = None  # pose of the last one that was remembered
 
-    def add(self, keyframe: Keyframe) -> None:
-        """Remember a keyframe."""
+    def add(self, keyframe: Keyframe, world_from_camera: F64) -> Features | None:
+        """Remember a keyframe at its pose (4, 4); None when it stands where the last one that was remembered did."""
+        if self._last is not None:
+            off = logarithm(inverse(self._last) @ world_from_camera)
+            if np.linalg.norm(off[:3]) < self.config.still_m and np.linalg.norm(off[3:]) < self.config.still_rad:
+                self.features.append(None)
+                self.layouts.append(np.zeros_like(self.layouts[-1]))
+                return None
+        self._last = world_from_camera
         depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
         gray = np.asarray(cv2.cvtColor(keyframe.color, cv2.COLOR_RGB2GRAY), np.uint8)
-        self.features.append(describe(gray, depth_m, keyframe.intrinsics, self.config.features))
+        seen = describe(gray, depth_m, keyframe.intrinsics, self.config.features)
+        self.features.append(seen)
         self.layouts.append(_layout(keyframe.color))
+        return seen
 
     def loops(self, poses: F64, walked_m: F64) -> list[Loop]:
         """Loops of the newest keyframe with earlier ones.
 
         poses: (K, 4, 4) world_from_camera of all; walked_m: (K,) path length at each.
         """
-        new = len(poses) - 1
-        found = []
+        new, seen, found = len(poses) - 1, self.features[-1], []
         near = self._near(poses, walked_m)
         for old in [*near, *self._alike(near)]:
-            pose = relate(self.features[old], self.features[new], self.config.features)
-            if pose is not None and self._is_likely(
-                inverse(poses[old]) @ poses[new], pose, walked_m[new] - walked_m[old]
-            ):
+            known = self.features[old]
+            pose = relate(known, seen, self.config.features) if known and seen else None
+            if pose is None:
+                continue
+            if self._is_likely(inverse(poses[old]) @ poses[new], pose, walked_m[new] - walked_m[old]):
                 found.append(Loop(old, new, pose.reference_from_camera, int(pose.inlier.sum())))
         return found
 
@@ -99,7 +111,8 @@ class Places:
         angle = np.arccos(np.clip(old[:, :3, 2] @ poses[new, :3, 2], -1, 1))
         drift_m = c.drift_share * (walked_m[new] - walked_m[: len(old)])
         cost = np.maximum(apart_m - drift_m, 0) / c.reach_m + angle / c.turn_rad
-        possible = (apart_m < c.reach_m + drift_m) & (angle < c.turn_rad)
+        remembered = np.array([one is not None for one in self.features[: len(old)]])
+        possible = remembered & (apart_m < c.reach_m + drift_m) & (angle < c.turn_rad)
         chosen: list[int] = []
         for i in np.argsort(cost, kind="stable").tolist():
             if len(chosen) == c.tries:

@@ -37,7 +37,7 @@ def test_logarithm_undoes_exponential(step: np.ndarray) -> None:
 def test_corners_alone_give_the_pose() -> None:
     found = register(seen_from(MOVED, 60), None, INTRINSICS, np.eye(4), CONFIG)
     assert np.allclose(found.reference_from_camera, MOVED, atol=1e-4) and found.inlier.all()
-    assert found.sigma_m < 0.01 and found.met == 0
+    assert found.met == 0
 
 
 def test_a_third_of_wrong_corners_does_not_move_it_and_is_named() -> None:
@@ -55,9 +55,9 @@ def test_corners_without_depth_count_by_their_pixels() -> None:
     assert np.allclose(found.reference_from_camera, MOVED, atol=1e-3)
 
 
-def test_nothing_seen_leaves_the_prediction_and_says_how_loose_it_is() -> None:
+def test_nothing_seen_leaves_the_prediction() -> None:
     found = register(NONE, None, INTRINSICS, MOVED, CONFIG, prior_sigmas=(0.03, 0.02))
-    assert np.allclose(found.reference_from_camera, MOVED) and found.sigma_m > 1000 and len(found.inlier) == 0
+    assert np.allclose(found.reference_from_camera, MOVED) and len(found.inlier) == 0
 
 
 def test_a_wall_holds_distance_and_tilt_and_the_prediction_what_slides(room_view, standing) -> None:

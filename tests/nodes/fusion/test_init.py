@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from placegraph.nodes.fusion import NODE
 from placegraph.runtime.codec import encode
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.messages import LastKeyframe
+from placegraph.runtime.messages import Correction, LastKeyframe
 from placegraph.runtime.node import Context
 
 SCENE = {
@@ -147,3 +147,25 @@ def test_objects_that_their_views_doubt_are_not_in_the_map(view):
         return sorted({final.tag_names[i] for i in final.tag_offsets[:-1]})
 
     assert names(0.0) == ["chair", "cup", "table"] and names(0.3) == ["chair", "table"] and names(0.9) == []
+
+
+def test_a_move_told_with_a_keyframe_whose_segments_were_lost_is_followed(view):
+    node = NODE(NODE.config_type(map_every=1, submap={"keyframes": 1}), Context(given=("Correction",)))
+    first, lost, third = circle(view, 3)
+    moved = first[0].world_from_camera.copy()
+    moved[0, 3] += 0.5
+
+    def correction(keyframe, moves=()):
+        return Correction(
+            frame_id=keyframe.frame_id,
+            stamp_ns=keyframe.stamp_ns,
+            world_from_camera=keyframe.world_from_camera,
+            moved_frame_ids=np.array([i for i, _ in moves], np.int64),
+            moved_world_from_camera=np.array([pose for _, pose in moves]).reshape(-1, 4, 4),
+        )
+
+    (before,) = [m for one in (*first, correction(first[0])) for m in node.step(one)]
+    for one in (lost[0], correction(lost[0], [(first[0].frame_id, moved)]), *third):
+        assert not node.step(one)
+    (after,) = node.step(correction(third[0]))
+    assert after.camera_positions_world[0] - before.camera_positions_world[0] == pytest.approx([0.5, 0, 0], abs=1e-6)

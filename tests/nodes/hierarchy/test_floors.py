@@ -81,3 +81,12 @@ def test_dense_points_in_a_corner_weigh_no_more_than_their_area(house_points, wa
     heap = np.random.default_rng(1).uniform((0, 0, 1.29), (0.2, 0.2, 1.31), (50000, 3))
     found = floors(np.concatenate((house_points(1), heap)), walk(1))
     assert [round(f.low, 1) for f in found] == [0.0]
+
+
+def test_two_exactly_flat_levels_with_nothing_between():
+    grid = np.stack(np.meshgrid(np.arange(0, 5, 0.05), np.arange(0, 5, 0.05)), axis=-1).reshape(-1, 2)
+    points = np.concatenate([np.insert(grid, 2, z, axis=1) for z in (0.0, 3.0)]).astype(np.float32)
+    cameras = np.array([[2, 2, z] for z in (1.4, 4.4) for _ in range(5)], np.float32)
+    spans = find_floors(points, cameras, FloorConfig())
+    assert [span.low for span in spans] == pytest.approx([0, 3], abs=0.02)
+    assert all(span.low <= span.high <= span.ceiling for span in spans)

@@ -112,3 +112,14 @@ def test_same_frames_same_poses_bit_for_bit() -> None:
 def test_bad_settings(settings: dict) -> None:
     with pytest.raises(ValueError, match="Input should be"):
         PoseConfig(**settings)
+
+
+def test_dark_frames_at_first_do_not_decide_which_way_is_up() -> None:
+    pitched = np.array([0.0, -np.cos(0.4), -np.sin(0.4)])
+    odometry = node(gravity_frames=3)
+    for i in range(3):
+        given = odometry.step(frame(i, np.zeros((120, 160)), up=pitched))
+    assert [pose.trusted for pose in given] == [False] * 3  # type: ignore[attr-defined]
+    later = [pose for i in range(3, 7) for pose in odometry.step(frame(i, room_depth(0), up=pitched))]
+    assert [pose.frame_id for pose in later] == [3, 4, 5, 6]
+    assert np.allclose(later[0].world_from_camera[:3, :3] @ pitched, [0, 0, 1])  # type: ignore[attr-defined]

@@ -77,3 +77,11 @@ def test_same_views_same_poses_bit_for_bit(standing, seen) -> None:
         return [odometry.register(seen(p), i)["world_from_camera"].tobytes() for i, p in enumerate(walk(standing, 6))]
 
     assert once() == once()
+
+
+def test_a_tiny_image_does_not_crash_the_search_for_patches(standing, seen) -> None:
+    odometry = RgbdOdometry(RgbdConfig(least_inliers=6))
+    for i, pose in enumerate(walk(standing, 3)):
+        view = seen(pose)
+        tiny = View(view.gray[::5, ::5].copy(), view.depth_m[::5, ::5].copy(), view.intrinsics / 5)
+        assert np.isfinite(odometry.register(tiny, i * PERIOD_NS)["world_from_camera"]).all()

@@ -96,3 +96,10 @@ def test_same_keyframes_same_corrections_bit_for_bit(keyframe, standing) -> None
         return [one.world_from_camera.tobytes() for one in given]
 
     assert once() == once()
+
+
+def test_a_camera_that_stands_still_is_remembered_once(keyframe, standing) -> None:
+    node = PoseGraphNode(PoseGraphConfig(), Context())
+    for i in range(5):
+        node.step(keyframe(i, standing(0, 0, 0), standing(0, 0, 0)))
+    assert [one is not None for one in node._places.features] == [True, False, False, False, False]
