@@ -85,3 +85,15 @@ def test_a_tiny_image_does_not_crash_the_search_for_patches(standing, seen) -> N
         view = seen(pose)
         tiny = View(view.gray[::5, ::5].copy(), view.depth_m[::5, ::5].copy(), view.intrinsics / 5)
         assert np.isfinite(odometry.register(tiny, i * PERIOD_NS)["world_from_camera"]).all()
+
+
+def test_a_camera_that_was_carried_is_not_trusted_until_it_knows_where_it_is(standing, seen) -> None:
+    odometry, poses = RgbdOdometry(RgbdConfig()), walk(standing, 12)
+    for i, pose in enumerate(poses):
+        odometry.register(seen(pose), i * PERIOD_NS)
+    elsewhere = [standing(0.9 - 0.03 * i, 1.2, 3.6 + 0.02 * i) for i in range(6)]  # frame by frame, as if nothing were
+    assert not any(odometry.register(seen(pose), (12 + i) * PERIOD_NS)["trusted"] for i, pose in enumerate(elsewhere))
+    back = odometry.register(seen(poses[6]), 18 * PERIOD_NS)
+    assert back["trusted"]
+    off = inverse(inverse(poses[0]) @ poses[6]) @ back["world_from_camera"]
+    assert np.linalg.norm(off[:3, 3]) < 0.03
