@@ -48,12 +48,11 @@ class LoopConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A verified motion (4, 4) from keyframe number `second` to `first`, and how many corners agree."""
+    """A verified motion (4, 4) from keyframe number `second` to `first`."""
 
     first: int
     second: int
     first_from_second: F64
-    inliers: int
 
 
 @dataclass(eq=False)
@@ -94,7 +93,7 @@ class Places:
             if pose is None:
                 continue
             if self._is_likely(inverse(poses[old]) @ poses[new], pose, walked_m[new] - walked_m[old]):
-                found.append(Loop(old, new, pose.reference_from_camera, int(pose.inlier.sum())))
+                found.append(Loop(old, new, pose.reference_from_camera))
         return found
 
     def _is_likely(self, expected: F64, found: Registered, walked_m: float) -> bool:
