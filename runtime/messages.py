@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -190,6 +191,7 @@ class Question(Message):
     k: int  # how many candidates to list
     mode: str  # one of question.MODES
     viewpoint_world: F64 = array("float64", (3,), unit="m", frame="world")  # the asker's position; NaN: not given
+    heading_rad: float = math.nan  # where the asker looks, about z from +x; NaN: not given
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

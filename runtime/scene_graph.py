@@ -74,6 +74,7 @@ class Node:
     oriented_box: tuple[float, ...] = ()  # objects: centre x y z, size x y z, yaw in rad about z
     color: tuple[int, ...] = ()  # objects: sRGB median
     approach: Approach | None = None  # objects: where to stand to face it; None where there is no such place
+    front: tuple[float, ...] = ()  # imported objects: x y of the direction that their front faces; () where unknown
 
     @property
     def layer(self) -> str:
@@ -161,6 +162,8 @@ class SceneGraph:
             raise SchemaError(f"{where}: footprint must be (K, 2) and finite")
         if node.oriented_box and (len(node.oriented_box) != 7 or not all(map(math.isfinite, node.oriented_box))):
             raise SchemaError(f"{where}: oriented_box must be 7 finite numbers")
+        if node.front and (len(node.front) != 2 or not all(map(math.isfinite, node.front)) or not any(node.front)):
+            raise SchemaError(f"{where}: front must be 2 finite numbers, not both 0")
 
     @cached_property
     def _children(self) -> dict[str, tuple[str, ...]]:
@@ -265,6 +268,8 @@ def _node_to_dict(node: Node) -> dict[str, Any]:
             "color": list(node.color),
             "approach": approach_to_dict(node.approach),
         }
+        if node.front:
+            entry["front"] = rounded(node.front, 3)
     return entry
 
 
@@ -284,6 +289,7 @@ def _node_from_dict(entry: Any, where: str) -> Node:
             oriented_box=tuple(float(v) for v in entry.get("oriented_box", ())),
             color=tuple(int(v) for v in entry.get("color", ())),
             approach=approach_from_dict(entry.get("approach")),
+            front=tuple(float(v) for v in entry.get("front", ())),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SchemaError(f"{where}: {type(error).__name__}: {error}") from None

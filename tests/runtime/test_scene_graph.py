@@ -94,3 +94,10 @@ def test_bad_files(tmp_path: Path, text: str, problem: str) -> None:
     assert str(path) in str(error.value)
     with pytest.raises(SchemaError, match="cannot read"):
         SceneGraph.load(tmp_path / "absent.json")
+
+
+def test_a_front_is_kept_and_must_be_a_direction() -> None:
+    graph = SceneGraph.of([*house(), node("O7", "R0", front=(0.0, -1.0))])
+    assert SceneGraph.from_json(graph.to_json()).nodes["O7"].front == (0.0, -1.0)
+    with pytest.raises(SchemaError, match="front"):
+        SceneGraph.of([*house(), node("O7", "R0", front=(0.0, 0.0))])
