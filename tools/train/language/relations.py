@@ -193,6 +193,7 @@ ENTERING = (
     ("when you walk in", "walk in"), ("when entering the room", "entering"), ("as you come in", "come in"),
     ("if you just walk in", "walk in"), ("from the entrance", "entrance"), ("from the doorway", "doorway"),
 )  # fmt: skip
-BACK: tuple[str, ...] = ("with your back to {}", "with {} behind you", "with {} at your back", "with your back against {}",
-    "with your back up to {}",
-        "if {} is behind you", "turning your back to {}")  # fmt: skip
+BACK: tuple[str, ...] = (
+    "with your back to {}", "with {} behind you", "with {} at your back", "with your back against {}",
+    "with your back up to {}", "if {} is behind you", "turning your back to {}",
+)  # fmt: skip
