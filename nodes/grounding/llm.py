@@ -88,6 +88,17 @@ class LanguageModel:
         self.load()
         return self._used(text, opening) + max_tokens <= self.n_ctx
 
+    def encode(self, text: str, opening: str = "") -> list[int]:
+        """Tokens of a prompt as `complete` reads it; with an opening, special tokens are read in it alone."""
+        self.load()
+        return self._opening_tokens(opening) + self._text_tokens(text, opening)
+
+    def encode_reply(self, text: str) -> list[int]:
+        """Tokens of what is written after a prompt."""
+        self.load()
+        tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=False)
+        return tokens
+
     def complete(self, text: str, grammar: str, max_tokens: int, opening: str = "") -> str:
         """Greedy completion of a prompt under a GBNF grammar that was built by `program`, at most max_tokens long.
 
@@ -120,7 +131,7 @@ class LanguageModel:
         Raises QueryError when the prompt does not fit the context.
         """
         self.load()
-        encoded = [self._llama.tokenize(option.encode(), add_bos=False) for option in options]
+        encoded = list(map(self.encode_reply, options))
         tokens = self._tokens(text, max((len(option) for option in encoded), default=0), before=opening)
         self.calls += 1
         self._open(opening)
@@ -165,8 +176,7 @@ class LanguageModel:
         return np.asarray(logits - np.log(np.exp(logits).sum()))
 
     def _tokens(self, text: str, more: int, before: str = "") -> list[int]:
-        # add_bos: the beginning mark, for the models whose file asks for it
-        tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=not before, special=not before)
+        tokens = self._text_tokens(text, before)
         used = self._used(text, before)
         if used + more > self.n_ctx:
             raise QueryError(
@@ -177,8 +187,12 @@ class LanguageModel:
 
     def _used(self, text: str, opening: str) -> int:
         """Tokens of a prompt."""
-        tokens = self._llama.tokenize(text.encode(), add_bos=not opening, special=not opening)
-        return len(tokens) + len(self._opening_tokens(opening))
+        return len(self._opening_tokens(opening)) + len(self._text_tokens(text, opening))
+
+    def _text_tokens(self, text: str, opening: str) -> list[int]:
+        # add_bos: the beginning mark, for the models whose file asks for it
+        tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=not opening, special=not opening)
+        return tokens
 
     def _opening_tokens(self, opening: str) -> list[int]:
         tokens: list[int] = self._llama.tokenize(opening.encode(), add_bos=True, special=True) if opening else []

@@ -106,6 +106,20 @@ def locations(data: Data, work: Work, steps: Steps = 3200, threads: Threads = 1)
         print(file)
 
 
+@app.command()
+def reader(
+    out: Annotated[Path, typer.Option(help="Adapter to write, a .gguf; checkpoints lie beside it.")],
+    steps: Steps = 2000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the generated requests and the first weights.")] = 0,
+    batch: Annotated[int, typer.Option(min=1, help="Requests a step.")] = 16,
+    threads: Threads = 2,
+) -> None:
+    """Train the language model's adapter that reads requests into programs, on generated requests."""
+    from placegraph.tools.train.reader import train_reader
+
+    train_reader(out, steps, seed=seed, batch=batch, threads=threads)
+
+
 @app.command("evaluate-locations")
 def evaluate_locations(
     model: Annotated[list[str] | None, typer.Option(help="Networks of the manifest, besides the recipe.")] = None,

@@ -30,10 +30,14 @@ def fit(
     checkpoint: Path,
     weight_decay: float = 0.02,
     warm_up: int = 200,
+    clip: float = 10.0,
+    save_every: int = SAVE_EVERY,
+    at_save: Callable[[int, nn.Module], None] | None = None,
 ) -> Any:
     """Train to `steps`, going on from `checkpoint` where there is one; returns the network of averaged weights.
 
     step(i) computes the losses of step i, in bfloat16 where that is safe; equal seeds and data give the same course.
+    clip: most norm of the gradient. at_save(steps done, network of averaged weights) is called after each checkpoint.
     """
     optimizer = torch.optim.AdamW(_groups(network, weight_decay), lr=rate, betas=(0.9, 0.99))
     average = copy.deepcopy(network).eval()
@@ -49,7 +53,7 @@ def fit(
         loss = sum(parts.values(), torch.zeros(()))
         optimizer.zero_grad(set_to_none=True)
         loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 10.0)
+        nn.utils.clip_grad_norm_(network.parameters(), clip)
         optimizer.step()
         _follow(average, network, min(AVERAGE, (i + 1) / (i + 20)))
         for name, value in parts.items():
@@ -59,8 +63,10 @@ def fit(
             said = time.monotonic()
             listed = " ".join(f"{name} {value:.3f}" for name, value in mean.items())
             print(f"step {i + 1} of {steps}: {listed}; {pace:.2f} s a step", flush=True)
-        if (i + 1) % SAVE_EVERY == 0 or i + 1 == steps:
+        if (i + 1) % save_every == 0 or i + 1 == steps:
             _save(checkpoint, i + 1, network, average, optimizer)
+            if at_save is not None:
+                at_save(i + 1, average)
     return average.eval()
 
 
