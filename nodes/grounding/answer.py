@@ -102,7 +102,7 @@ class Reasoner:
             prompt("target", question=said, things=", ".join(found.target_options)),
             object_grammar(fields),
             CHOICE_TOKENS,
-        )
+        ).text
         return found.by_target[read_choice(reply, fields)["target"]]
 
     @staticmethod

@@ -234,5 +234,5 @@ def dictated(model: LanguageModel, text: str, graph: SceneGraph, is_place: Calla
     """The program of a question in this map as the model reads it. Raises QueryError."""
     offer = offered(text, graph, is_place)
     opening, rest = prompt("program", question=" ".join(tokens(text))).split("|", 1)
-    reply = model.complete(rest, program_grammar(offer), REPLY_TOKENS, opening=opening)
+    reply = model.complete(rest, program_grammar(offer), REPLY_TOKENS, opening=opening).text
     return read_program(reply, offer, text)

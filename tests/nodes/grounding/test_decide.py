@@ -2,7 +2,7 @@ import pytest
 
 from placegraph.nodes.grounding.decide import MOST_SHOWN, choose, settle
 from placegraph.nodes.grounding.ground import Candidate, Ranking
-from placegraph.nodes.grounding.llm import LanguageModel
+from placegraph.nodes.grounding.llm import LanguageModel, Reply
 from placegraph.runtime.errors import QueryError
 
 
@@ -18,7 +18,7 @@ class Canned(LanguageModel):
 
     def complete(self, text, grammar, max_tokens, opening=""):
         self.asked.append((opening + text, grammar))
-        return self.reply
+        return Reply(self.reply, 0.0)
 
 
 @pytest.fixture
