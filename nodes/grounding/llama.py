@@ -82,4 +82,5 @@ class Allowed:
             data=data.ctypes.data_as(self._inner.llama_token_data_p), size=len(data), selected=-1, sorted=False
         )
         self._inner.llama_sampler_apply(self._sampler, ctypes.byref(array))
-        return tokens[np.isfinite(data["logit"])]
+        allowed: NDArray[np.int64] = tokens[np.isfinite(data["logit"])]
+        return allowed
