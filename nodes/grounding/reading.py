@@ -1,12 +1,45 @@
-"""A request read into a program by the language model with its adapter."""
+"""A request read into a program by the language model with its adapter, held to the grammar of that request's programs.
+
+Source: METHOD section 10, step 1. The adapter is trained by tools/train/reader.py on the very prompts written here.
+"""
 
 from __future__ import annotations
 
-from placegraph.nodes.grounding.words import tokens
+import math
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
 
-# What stands before and after a request, alike in training (tools/train/reader.py) and in use.
+from placegraph.nodes.grounding.llm import LanguageModel
+from placegraph.nodes.grounding.notation import grammar, read
+from placegraph.nodes.grounding.schema import Thing
+from placegraph.nodes.grounding.words import tokens
+from placegraph.runtime.errors import ModelError, QueryError
+
+ADAPTER_FILE = "reader.gguf"
+# What stands before and after a request.
 OPENING = "<|im_start|>request\n"
 CLOSING = "\nprogram:"
+MOST_WORDS = 80  # departs: with punctuation; people need 27 at most (400 requests read), training has up to 60
+REPLY_TOKENS = 96  # departs: 57 are the most of 2,000 generated programs; a reply that does not end costs 2 s at most
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was read, and how likely the model found just this program (0 to 1)."""
+
+    thing: Thing
+    confidence: float
+
+
+def default_adapter_path() -> Path:
+    """The packaged adapter for the packaged language model; raises ModelError when the installation lacks it."""
+    path = Path(str(resources.files(__package__))) / "embedded" / ADAPTER_FILE
+    if not path.is_file():
+        raise ModelError(
+            f"{path}: the adapter that reads requests is not installed (`placegraph train reader` makes one)"
+        )
+    return path
 
 
 def asked(text: str) -> str:
@@ -17,3 +50,16 @@ def asked(text: str) -> str:
 def reply(program: str) -> str:
     """A program's text as the model writes it."""
     return f" {program}\n"
+
+
+def read_request(model: LanguageModel, text: str) -> Reading:
+    """The thing that a request describes.
+
+    Raises QueryError for a request without a word, of over MOST_WORDS words, or whose program does not end, and
+    ModelError when the model has no adapter.
+    """
+    words = len(tokens(text))
+    if words > MOST_WORDS:
+        raise QueryError(f"the request has {words} words and marks; at most {MOST_WORDS} are read")
+    said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=OPENING, adapted=True)
+    return Reading(read(said.text), math.exp(said.log_probability))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from placegraph.nodes.grounding.ground import Candidate
+from placegraph.nodes.grounding.ranking import Candidate
 from placegraph.runtime.scene_graph import SceneGraph
 
 
