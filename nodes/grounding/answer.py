@@ -48,9 +48,9 @@ class Reasoner:
         """The fields of the answer, all but those of an error. Raises QueryError when the question is not usable."""
         _check(question)
         before = self._model.calls
-        by_model = question.mode == "model"
+        by_model = question.mode == "deductive"
         if by_model and not self._use_model:
-            raise QueryError("mode 'model' needs the language model, which use_model = false switches off")
+            raise QueryError("mode 'deductive' needs the language model, which use_model = false switches off")
         program = self.parse(graph, question.text, by_model=by_model)
         scope = narrow(graph, program, self._names)
         if program.purpose:

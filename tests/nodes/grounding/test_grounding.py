@@ -116,7 +116,7 @@ def test_a_tie_with_words_left_is_put_to_the_model(node, ask, graph_message, hou
 def test_the_model_reads_and_chooses_whatever_was_asked_before(node, ask, graph_message, house):
     node.step(graph_message(house))
     first, second = "find the lamp", "a nightstand"
-    answers = [ask(node, text, mode="model") for text in (first, second, first)]
+    answers = [ask(node, text, mode="deductive") for text in (first, second, first)]
     assert answers[0] == answers[2]
     for answer in answers:
         assert answer["status"] in ("found", "not_in_map")
