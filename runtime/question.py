@@ -78,7 +78,7 @@ def question_of(request: dict[str, Any]) -> Question:
     """The Question of a request's fields; raises QueryError naming the field that is wrong."""
     for field in sorted(set(request) - set(FIELDS)):
         what = "it is called pose" if field == "viewpoint" else f"there are: {', '.join(sorted(FIELDS))}"
-        raise QueryError(f"unknown field {ascii(reprlib.repr(field))[1:-1]}; {what}")
+        raise QueryError(f"unknown field {_shown(field)}; {what}")
     try:
         checked = Request.model_validate(request)
     except ValidationError as error:
@@ -107,4 +107,9 @@ def _reason(error: ValidationError) -> str:
         return f"{expected}, got {len(first['input'])}"
     if first["type"] == "string_unicode":  # JSON can spell half of a surrogate pair, UTF-8 cannot
         return f"{expected}, got half of a surrogate pair, which is no character"
-    return f"{expected}, got {ascii(reprlib.repr(first['input']))[1:-1]}"
+    return f"{expected}, got {_shown(first['input'])}"
+
+
+def _shown(value: object) -> str:
+    """The start of a value as it can be sent: half a surrogate pair, which UTF-8 cannot spell, as its number."""
+    return reprlib.repr(value).encode("utf-8", "backslashreplace").decode()
