@@ -152,7 +152,7 @@ class Reasoner:
             object_grammar(fields),
             CHOICE_TOKENS,
         )
-        return drafted.by_target[read_choice(reply, fields)["target"]]
+        return drafted.by_target[read_choice(reply.text, fields)["target"]]
 
     @staticmethod
     def _is_tag(phrase: str, objects: Sequence[Node]) -> bool:

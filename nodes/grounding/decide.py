@@ -31,7 +31,7 @@ def settle(model: LanguageModel | None, graph: SceneGraph, ranking: Ranking, tex
     ranking.notes.append(f"{len(tied)} candidates fit equally: {_ids(tied)}")
     if model is not None and len(tied) <= MOST_SHOWN:
         asked = prompt("tie", objects=small_graph(graph, tied), question=" ".join(tokens(text)))
-        reply = model.complete(asked, f"root ::= {enum_rule(list(map(_id, tied)))}", ID_TOKENS)
+        reply = model.complete(asked, f"root ::= {enum_rule(list(map(_id, tied)))}", ID_TOKENS).text
         chosen = _put_first(ranking, tied, reply)
         ranking.notes.append(f"the language model chose {_id(chosen)}")
     return False
@@ -50,7 +50,7 @@ def choose(model: LanguageModel, graph: SceneGraph, ranking: Ranking, text: str)
     while len(shown) > 2 and not model.fits(opening, asked, ID_TOKENS):
         shown = shown[:-1]
         opening, asked = _question(graph, shown, text)
-    reply = model.complete(asked, f'root ::= " " ({enum_rule(list(map(_id, shown)))})', ID_TOKENS, opening=opening)
+    reply = model.complete(asked, f'root ::= " " ({enum_rule(list(map(_id, shown)))})', ID_TOKENS, opening=opening).text
     chosen = _put_first(ranking, shown, reply.strip())
     of = f", the best of {count}" if len(shown) < count else ""
     against = "" if chosen is best else f"; by the evidence alone it would be {_id(best)}"

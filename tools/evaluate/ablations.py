@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from placegraph.models_onnx.text import TextEncoder
+from placegraph.nodes.camera import detect
 from placegraph.nodes.grounding.answer import Reasoner
 from placegraph.nodes.grounding.llm import LanguageModel
 from placegraph.nodes.grounding.names import Names
@@ -26,6 +27,7 @@ from placegraph.runtime.errors import ConfigError, QueryError, SourceError
 from placegraph.runtime.messages import Question
 from placegraph.runtime.question import make_question
 from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.tools.evaluate.aligned_map import read_aligned
 from placegraph.tools.evaluate.grounding import Reply, read_questions
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
 from placegraph.tools.house.build import build
@@ -38,12 +40,16 @@ F64 = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A graph, the questions about it, and the rigid transform (4, 4) from the graph's frame to the questions'."""
+    """A graph, the questions about it, and how its frame lies in that of the questions.
+
+    true_from_graph: (4, 4) rigid transform. boxes: (2, 3) of each object by id, in the frame of the questions.
+    """
 
     name: str
     graph: SceneGraph
     questions: Sequence[AskedQuestion]
     true_from_graph: F64
+    boxes: Mapping[str, F64]
 
     def question(self, asked: AskedQuestion, mode: str = "program") -> Question:
         """What the asker sends: the text, and where it stands in the graph's frame."""
@@ -56,7 +62,9 @@ class Scene:
 def house_scene(seed: int, count: int) -> Scene:
     """The true graph of a house of a seed with up to `count` questions."""
     house = build(seed)
-    return Scene(f"house {seed}", true_graph(house), questions(house, seed, count), np.eye(4))
+    graph = true_graph(house)
+    boxes = {node.id: node.box for node in graph.layer("object")}
+    return Scene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes)
 
 
 def map_scene(folder: Path, source: Path) -> Scene:
@@ -64,11 +72,11 @@ def map_scene(folder: Path, source: Path) -> Scene:
     asked = read_questions(source)
     if not asked:
         raise SourceError(f"{source}: no questions in truth/questions.json")
-    from placegraph.nodes.camera import detect
-
     given = detect(str(source))(source, {}).given_poses()
     estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
-    return Scene(str(folder), SceneGraph.load(find_graph(folder)), asked, level_alignment(estimated, true))
+    true_from_map = level_alignment(estimated, true)
+    boxes = {one.id: one.box for one in read_aligned(folder, true_from_map).objects}
+    return Scene(str(folder), SceneGraph.load(find_graph(folder)), asked, true_from_map, boxes)
 
 
 class Asker:

@@ -63,13 +63,7 @@ def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> li
 def variant_scores(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) -> dict[str, Any]:
     """Scores of one variant in all and by form: of all scenes' questions together."""
     asked = [(i, question) for i, scene in enumerate(scenes) for question in scene.questions]
-    boxes = {}
-    for i, scene in enumerate(scenes):
-        rotation, shift = scene.true_from_graph[:3, :3], scene.true_from_graph[:3, 3]
-        for node in scene.graph.layer("object"):
-            corners = node.box[[[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)], range(3)]
-            moved = corners @ rotation.T + shift
-            boxes[f"{i}/{node.id}"] = np.stack((moved.min(axis=0), moved.max(axis=0)))
+    boxes = {f"{i}/{node_id}": box for i, scene in enumerate(scenes) for node_id, box in scene.boxes.items()}
     flat = [
         Reply(one.status, f"{i}/{one.object_id}" if one.object_id else "", one.calls, one.ms)
         for i, scene in enumerate(replies)
