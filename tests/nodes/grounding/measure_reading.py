@@ -37,7 +37,8 @@ def people():
 
 def by_rules(text):
     box = np.zeros((2, 3))
-    graph = SceneGraph.of([Node(id="B0", parent="", tags=(), box=box, footprint=box[:, :2], first_frame=-1, last_frame=-1)])
+    building = Node(id="B0", parent="", tags=(), box=box, footprint=box[:, :2], first_frame=-1, last_frame=-1)
+    graph = SceneGraph.of([building])
     reasoner = Reasoner(Names(TextEncoder().encode), None, (*ROOM_TYPES, *LOCATION_TYPES), use_model=False)
     return reasoner.parse(graph, text).target, 1.0
 
@@ -52,7 +53,8 @@ def main(arguments):
         "rules": by_rules,
     }
     kept = [(one.text, [one.program]) for one in examples(1_000_003, 500, 300, held_out=True)]
-    print("| sentences | read by | exact program | noun | s p50 | s p95 | confidence right, wrong |\n|---|---|---|---|---|---|---|")
+    heads = ("sentences", "read by", "exact program", "noun", "s p50", "s p95", "confidence right, wrong")
+    print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
     for name, cases in (("100 of people", list(people())), ("300 generated", kept)):
         for way in next((a.split(",") for a in arguments if a[0] != "-" and not a.endswith(".gguf")), ["adapter"]):
             exact, noun, seconds, sure = [], [], [], []
