@@ -28,7 +28,7 @@ ONLY_IMPORTERS = {
     "rerun": ("runtime/recording.py", "nodes/recorder/"),
     "onnxruntime": ("models_onnx/session.py", "tools/train/export.py"),
     "kiss_icp": ("nodes/pose/odometry.py",),
-    "llama_cpp": ("nodes/grounding/llm.py",),
+    "llama_cpp": ("nodes/grounding/llama.py", "nodes/grounding/llm.py"),
     "wordllama": ("models_onnx/text.py",),
     "depthai": ("nodes/camera/oak.py",),
     "onnx": ("tools/drawn_scene_network.py", "tools/train/export.py", "tools/train/fold.py"),

@@ -7,7 +7,7 @@ import lzma
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import msgpack
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.nodes.grounding.llm import LanguageModel
+from placegraph.nodes.grounding.llm import LanguageModel, Reply
 from placegraph.runtime import messages as m
 from placegraph.runtime.codec import decode, encode
 from placegraph.runtime.errors import PlacegraphError, SchemaError
@@ -68,16 +68,16 @@ def language_model_replies(replies: dict[str, Any], ask: bool) -> Iterator[None]
     kept = {name: getattr(LanguageModel, name) for name in ("load", "complete", "log_probabilities")}
 
     def cut(name: str) -> Callable[..., Any]:
-        def reply(self: LanguageModel, *arguments: Any) -> Any:
-            key = json.dumps([name, *arguments], ensure_ascii=False)
+        def reply(self: LanguageModel, *arguments: Any, **named: Any) -> Any:
+            key = json.dumps([name, *arguments, *([named] if named else [])], ensure_ascii=False)
             if ask:
-                found = kept[name](self, *arguments)
-                replies[key] = found if isinstance(found, str) else found.tolist()
+                found = kept[name](self, *arguments, **named)
+                replies[key] = asdict(found) if isinstance(found, Reply) else found.tolist()
             elif key not in replies:
                 raise SchemaError(f"the reference holds no reply of the language model to {_short(key)}; {REMAKE}")
             else:
                 self.calls += 1
-            return replies[key] if isinstance(replies[key], str) else np.array(replies[key])
+            return Reply(**replies[key]) if name == "complete" else np.array(replies[key])
 
         return reply
 

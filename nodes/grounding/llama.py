@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.runtime.errors import ModelError, QueryError
+from placegraph.runtime.errors import ModelError
 
 TOKEN_DATA = np.dtype([("id", np.int32), ("logit", np.float32), ("p", np.float32)])  # llama.h
 
@@ -67,13 +67,11 @@ class Allowed:
         return len(self._among(np.array([self._end]))) > 0 and all(map(self.is_end, self._among(self._all).tolist()))
 
     def best(self, values: NDArray[np.float64]) -> int:
-        """The allowed token of highest value, the first of equals. Raises QueryError when none is allowed."""
+        """The allowed token of highest value, the first of equals."""
         favourite = int(values.argmax())
         if len(self._among(np.array([favourite]))):
             return favourite
         allowed = self._among(self._all)
-        if not len(allowed):
-            raise QueryError("the grammar of the language model's reply allows nothing")
         return int(allowed[values[allowed].argmax()])
 
     def _among(self, tokens: NDArray[np.int64]) -> NDArray[np.int64]:

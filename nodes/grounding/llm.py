@@ -135,8 +135,8 @@ class LanguageModel:
 
         opening: what many calls share, before the text; it is read once. With one, special tokens are read in it
         alone: words of a question or a tag cannot pose as them. adapted: by the model with its adapter.
-        Raises QueryError when the prompt with its reply does not fit the context, or the reply was cut off, and
-        ModelError when there is no adapter.
+        Raises QueryError when the prompt with its reply does not fit the context, the reply was cut off, or the model
+        has no adapter.
         """
         self.load()
         tokens = self._tokens(text, max_tokens, before=opening)
@@ -212,7 +212,7 @@ class LanguageModel:
         if adapted == self._adapted:
             return
         if self._adapter is None:
-            raise ModelError("the language model was loaded without the adapter that reads requests")
+            raise QueryError("the language model has no adapter, which this call needs")
         inner = safe_llama_cpp().llama_cpp
         adapters = (inner.llama_adapter_lora_p_ctypes * 1)(self._adapter)
         if inner.llama_set_adapters_lora(self._llama.ctx, adapters, int(adapted), (ctypes.c_float * 1)(1.0)):

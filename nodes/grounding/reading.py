@@ -55,8 +55,8 @@ def reply(program: str) -> str:
 def read_request(model: LanguageModel, text: str, *, adapted: bool = True) -> Reading:
     """The thing that a request describes.
 
-    Raises QueryError for a request without a word, of over MOST_WORDS words, or whose program does not end, and
-    ModelError when the model has no adapter.
+    Raises QueryError for a request without a word, of over MOST_WORDS words, or whose program does not end, and when
+    the model has no adapter.
     """
     words = len(tokens(text))
     if words > MOST_WORDS:

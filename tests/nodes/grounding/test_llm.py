@@ -6,12 +6,20 @@ import pytest
 
 from placegraph.nodes.grounding.llm import MOST_OPENINGS, LanguageModel, default_model_path, prompt
 from placegraph.nodes.grounding.program import enum_rule
-from placegraph.runtime.errors import QueryError
+from placegraph.nodes.grounding.reading import default_adapter_path
+from placegraph.runtime.errors import ModelError, QueryError
 
 
 @pytest.fixture(scope="module")
 def model():
     made = LanguageModel(n_ctx=256)
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def adapted():
+    made = LanguageModel(n_ctx=256, adapter_path=default_adapter_path())
     yield made
     made.close()
 
@@ -31,7 +39,7 @@ def test_a_prompt_that_does_not_fit_is_refused_and_the_model_lives_on(model):
             model.complete("word " * 300, "root ::= " + enum_rule(["O1"]), 8)
     with pytest.raises(QueryError, match="do not fit"):
         model.log_probabilities("word " * 150, " word" * 150, [" a"])
-    assert model.complete("Say O1:", "root ::= " + enum_rule(["O1"]), 8) == "O1"
+    assert model.complete("Say O1:", "root ::= " + enum_rule(["O1"]), 8).text == "O1"
 
 
 def test_a_reply_that_is_cut_off_is_refused(model):
@@ -101,3 +109,53 @@ def test_the_openings_kept_are_bounded(model):
         decoded(model, f"Opening {number}.")
         assert len(model._openings) <= MOST_OPENINGS
     assert decoded(model) == first
+
+
+def test_a_reply_says_how_likely_it_was_before_the_grammar(model):
+    prompt, rules = "One, two, three, four,", 'root ::= " five" | " seven"'
+    free = model.complete(prompt, rules, 8)
+    assert free.text == " five"
+    values = model.log_probabilities("One, two, three,", " four,", [" five", " seven"])
+    assert free.log_probability == pytest.approx(values[0], abs=0.02)  # read in one piece there, in two here
+    forced = model.complete(prompt, 'root ::= " seven"', 8)
+    assert forced.text == " seven"
+    assert forced.log_probability == pytest.approx(values[1], abs=0.02)
+
+
+def test_where_the_end_and_more_are_allowed_the_model_decides(model):
+    rules = 'root ::= "O1" ("2" | "3")?'
+    assert model.complete("O12 O12 O12 O12 ", rules, 8).text == "O12"
+    assert model.complete("Say O1 and nothing else.\nO1\nO1\nO1\nO1\n", rules + ' | "O1\n"', 8).text.strip() == "O1"
+
+
+def test_a_grammar_that_cannot_be_read_is_an_error_and_not_a_crash(model):
+    for rules in ("root ::= nothing", 'foot ::= "x"', "{{"):
+        with pytest.raises(ModelError, match="cannot read this grammar"):
+            model.complete("Say:", rules, 8)
+
+
+def test_the_adapter_is_on_for_the_calls_that_ask_for_it_alone(model, adapted):
+    def pair(asked):
+        return decoded(asked), probabilities(asked)
+
+    plain = pair(model)
+    assert pair(adapted) == plain
+    rules = 'root ::= " O1" | " O2"'
+    first = adapted.complete(" Say:", rules, 8, opening="A lamp.", adapted=True)
+    assert first != adapted.complete(" Say:", rules, 8, opening="A lamp.")
+    assert pair(adapted) == plain
+    assert adapted.complete(" Say:", rules, 8, opening="A lamp.", adapted=True) == first
+
+
+def test_an_adapter_that_is_not_there_or_does_not_fit_is_named(tmp_path, model):
+    with pytest.raises(QueryError, match="has no adapter"):
+        model.complete("Say:", "root ::= " + enum_rule(["O1"]), 8, adapted=True)
+    with pytest.raises(ModelError, match=r"nothing\.gguf: no such adapter"):
+        LanguageModel(adapter_path=tmp_path / "nothing.gguf").load()
+    broken = tmp_path / "broken.gguf"
+    for content in (b"", b"no adapter", default_adapter_path().read_bytes()[:100_000]):
+        broken.write_bytes(content)
+        with pytest.raises(ModelError, match=r"broken\.gguf: llama\.cpp cannot load it as an adapter of SmolLM2"):
+            LanguageModel(adapter_path=broken).load()
+    with pytest.raises(ModelError, match=r"Q4_1\.gguf: llama\.cpp cannot load it as an adapter"):
+        LanguageModel(adapter_path=default_model_path()).load()
