@@ -26,7 +26,7 @@ from placegraph.nodes.grounding.weighing import Weighing
 from placegraph.nodes.grounding.words import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
-MOST_PAIRS = 2_000_000  # departs: of targets and anchors judged at once; bounds memory on large maps
+MOST_PAIRS = 600_000  # departs: of targets and anchors judged at once; bounds memory on large maps
 FAIR_TRUST = 0.5  # departs: what is only likely to be called so decides half
 SPARE_TRUST = 0.3  # departs: "the cup on the table near the window" with one table: the cup near the window
 SAME_PLACE = 0.9  # departs: places whose score is at least this share of the best are meant together

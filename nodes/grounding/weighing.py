@@ -41,6 +41,9 @@ class Weighing:
         self.peers: Mask = told
         self.scores = np.where(told, self.scores, OFF_NAME * self.scores)
         self.holds: Mask = groups[-1]
+        self._ranked: Mask | None = (
+            None  # what all ranks are said of: a second rank is not among the winners of the first
+        )
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -60,6 +63,8 @@ class Weighing:
 
     def among(self) -> Mask:
         """(n,) those that a rank is said of: what holds so far, else what comes near to it."""
+        if self._ranked is not None:
+            return self._ranked
         held = self.holds & self.peers
         if held.any():
             return held
@@ -69,7 +74,8 @@ class Weighing:
         self, measure: F64, number: int, margin: float, sentence: Sentence, *, trust: float, negated: bool
     ) -> None:
         """Apply a rank: measure (n,), greatest first; the number-th among those that hold is meant."""
-        rows = np.flatnonzero(self.among() & np.isfinite(measure))
+        self._ranked = self.among()
+        rows = np.flatnonzero(self._ranked & np.isfinite(measure))
         if len(rows) < number and int(self.peers.sum()) >= number:
             rows = np.flatnonzero(self.peers & np.isfinite(measure))  # the second of one: something was misread
         values = np.full(len(self), OUTRANKED)

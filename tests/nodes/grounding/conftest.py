@@ -101,12 +101,12 @@ def unnamed_house():
     return make_house(named=False)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def node_of():
     return make_node
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def thing_of():
     return thing
 
@@ -128,17 +128,17 @@ def room_of():
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def graph_message():
     return make_graph_message
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def question_of():
     return make_question
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def ask():
     """Puts a question to a node and returns the answer's fields."""
 
