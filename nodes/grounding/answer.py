@@ -7,18 +7,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.nodes.grounding.decide import choose, settle
-from placegraph.nodes.grounding.dictate import dictated
+from placegraph.nodes.grounding.decide import settle
+from placegraph.nodes.grounding.deduce import deduce
 from placegraph.nodes.grounding.ground import Candidate, Grounder, Ranking
 from placegraph.nodes.grounding.llm import LanguageModel, prompt
 from placegraph.nodes.grounding.names import Names
 from placegraph.nodes.grounding.parse import draft
-from placegraph.nodes.grounding.program import Program, object_grammar, read_choice
+from placegraph.nodes.grounding.program import Program, Thing, object_grammar, read_choice
 from placegraph.nodes.grounding.select import Scope, narrow, places_called
 from placegraph.nodes.grounding.words import normal_form, tokens
 from placegraph.runtime.errors import QueryError
@@ -48,22 +49,17 @@ class Reasoner:
         """The fields of the answer, all but those of an error. Raises QueryError when the question is not usable."""
         _check(question)
         before = self._model.calls
-        by_model = question.mode == "model"
-        if by_model and not self._use_model:
-            raise QueryError("mode 'model' needs the language model, which use_model = false switches off")
-        program = self.parse(graph, question.text, by_model=by_model)
+        if question.mode == "deductive":
+            return self._deduced(graph, revision, question)
+        program = self.parse(graph, question.text)
         scope = narrow(graph, program, self._names)
         if program.purpose:
             program = self._by_purpose(program, scope)
         grounder = Grounder(graph, self._names, np.asarray(question.viewpoint_world, float))
         ranking = grounder.rank(program, scope)
-        if by_model:
-            ranking.notes.insert(0, "the language model read the question")
-            decided = choose(self._model, graph, ranking, question.text)
-        else:
-            # words that the program does not hold are all that could tell tied ones apart
-            reader = self._model if program.rest and self._use_model else None
-            decided = settle(reader, graph, ranking, question.text)
+        # words that the program does not hold are all that could tell tied ones apart
+        reader = self._model if program.rest and self._use_model else None
+        decided = settle(reader, graph, ranking, question.text)
         common = {
             "question": question.text,
             "question_id": question.question_id,
@@ -75,8 +71,27 @@ class Reasoner:
             return common | self._not_in_map(graph, program, ranking, grounder)
         return common | _found(graph, ranking, grounder, question.k, decided)
 
-    def parse(self, graph: SceneGraph, text: str, *, by_model: bool = False) -> Program:
-        """The program of a question in this map; by_model: wholly read by the language model. Raises QueryError."""
+    def _deduced(self, graph: SceneGraph, revision: int, question: Question) -> dict[str, Any]:
+        """The fields of an answer that the language model found level by level. Raises QueryError."""
+        if not self._use_model:
+            raise QueryError("mode 'deductive' needs the language model, which use_model = false switches off")
+        before = self._model.calls
+        asker_world = np.asarray(question.viewpoint_world, float)
+        reading, ranking = deduce(self._model, graph, self._names, question.text, asker_world)
+        grounder = Grounder(graph, self._names, asker_world)
+        common = {
+            "question": question.text,
+            "question_id": question.question_id,
+            "parse": asdict(reading),
+            "revision": revision,
+            "llm_calls": self._model.calls - before,
+        }
+        if not ranking.candidates:
+            return common | self._not_in_map(graph, Program(target=Thing()), ranking, grounder)
+        return common | _found(graph, ranking, grounder, question.k, ranking.sure)
+
+    def parse(self, graph: SceneGraph, text: str) -> Program:
+        """The program of a question in this map. Raises QueryError."""
         objects = graph.layer("object")
         places = [*graph.layer("room"), *graph.layer("location")]
 
@@ -91,8 +106,6 @@ class Reasoner:
         def is_known(phrase: str) -> bool:
             return self._names.is_known(phrase, objects) or is_place(phrase)
 
-        if by_model:
-            return dictated(self._model, text, graph, is_place)
         found = draft(text, is_place, is_known)
         if len(found.target_options) < 2 or not self._use_model:
             return found.program

@@ -13,7 +13,7 @@ def test_only_text_is_needed() -> None:
     assert np.isnan(question.viewpoint_world).all()
 
 
-@pytest.mark.parametrize("mode", ["program", "model"])
+@pytest.mark.parametrize("mode", ["program", "rules", "deductive"])
 def test_modes(mode: str) -> None:
     assert parse_request(json.dumps({"text": "cup", "mode": mode}).encode()).mode == mode
     assert parse_request(b'{"text": "cup"}').mode == "program"
