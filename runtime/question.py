@@ -13,7 +13,7 @@ from placegraph.runtime.messages import Question
 MAX_TEXT = 500  # characters; longer is not a request but a document
 MAX_CANDIDATES = 50
 MAX_COORDINATE_M = 1e6  # no building is larger, and no sum of squares overflows
-MODES = ("program", "rules", "deductive")  # a reading by the model, by phrase rules, or a call for each level
+MODES = ("program", "rules", "deductive")  # read by the model or by phrase rules and executed; level by level
 FIELDS = {"text", "id", "k", "mode", "viewpoint"}
 
 

@@ -12,11 +12,12 @@ import numpy as np
 from pydantic import Field
 
 from placegraph.models_onnx.text import TextEncoder
-from placegraph.nodes.grounding.answer import Reasoner, error_answer, to_json
+from placegraph.nodes.grounding.answer import Reasoner
 from placegraph.nodes.grounding.llm import N_CTX, LanguageModel
 from placegraph.nodes.grounding.names import Names
 from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES, Namer
 from placegraph.nodes.grounding.program import SAFE
+from placegraph.nodes.grounding.reply import error_answer, to_json
 from placegraph.runtime.errors import ConfigError, QueryError
 from placegraph.runtime.messages import Answer, Graph, Message, PlaceNames, Question
 from placegraph.runtime.node import Context, Node, NodeConfig

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from placegraph.nodes.grounding.ground import Candidate, Ranking
 from placegraph.nodes.grounding.llm import LanguageModel, prompt
 from placegraph.nodes.grounding.program import enum_rule
+from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.nodes.grounding.textualise import small_graph
 from placegraph.nodes.grounding.words import tokens
 from placegraph.runtime.errors import QueryError

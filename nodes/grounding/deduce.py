@@ -18,15 +18,14 @@ import numpy as np
 
 from placegraph.nodes.grounding.attributes import BASIC_COLORS, color_fit
 from placegraph.nodes.grounding.dialogue import NONE, Dialogue, Entry, Selection
-from placegraph.nodes.grounding.edges import edges, viewpoint_of
-from placegraph.nodes.grounding.ground import Candidate, Ranking
+from placegraph.nodes.grounding.edges import edges
+from placegraph.nodes.grounding.ground import Grounder
 from placegraph.nodes.grounding.llm import LanguageModel
-from placegraph.nodes.grounding.names import Names
 from placegraph.nodes.grounding.parse import check_text
-from placegraph.nodes.grounding.relations import F64, label
+from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.nodes.grounding.textualise import plain
 from placegraph.nodes.grounding.words import tokens
-from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
+from placegraph.runtime.scene_graph import Node, id_key
 
 MOST_LISTED = 48  # departs: entries of a level that are shown; more are ranked by name first
 MOST_CONTENTS = 8  # departs: names of what a place holds
@@ -37,8 +36,8 @@ OTHERS = 0.5  # score of a target that was not chosen; the model gives no number
 
 
 @dataclass(frozen=True)
-class Reading:
-    """What the flow kept of each level, as ids; the reply's `parse`."""
+class Kept:
+    """What was kept of each level, as ids; the reply's `parse`."""
 
     floors: tuple[str, ...] = ()
     rooms: tuple[str, ...] = ()
@@ -48,7 +47,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class _Kept:
+class _Level:
     """Nodes of one level: those where the target can be, or that can be it, and the same for the anchors."""
 
     targets: Sequence[Node]
@@ -63,38 +62,36 @@ class _Kept:
         return tuple(node.id for node in self.both)
 
 
-def deduce(
-    model: LanguageModel, graph: SceneGraph, names: Names, question: str, asker_world: F64
-) -> tuple[Reading, Ranking]:
-    """What was read on the way down, and the ranking: the chosen object first; none when the model says so.
+def deduce(model: LanguageModel, grounder: Grounder, question: str) -> tuple[Kept, Ranking]:
+    """What was kept on the way down, and the ranking: the chosen object first; none when the model says so.
 
-    asker_world: (3,) metres, world frame; NaN when the asker's place is not given.
+    grounder: of the graph that is asked, with the asker's place.
     Raises QueryError when the text is no question, or one entry does not fit the context.
     """
     check_text(question)
-    return _Flow(model, graph, names, question, asker_world).run()
+    return _Flow(model, grounder, question).run()
 
 
 class _Flow:
     """The steps of one question."""
 
-    def __init__(self, model: LanguageModel, graph: SceneGraph, names: Names, question: str, asker_world: F64) -> None:
-        self._graph, self._names, self._asker_world = graph, names, asker_world
+    def __init__(self, model: LanguageModel, grounder: Grounder, question: str) -> None:
+        self._grounder, self._graph, self._names = grounder, grounder.graph, grounder.names
         self._dialogue = Dialogue(model, question)
         self._grams = _grams(question)
         self._notes: list[str] = ["read level by level (deductive mode)"]
 
-    def run(self) -> tuple[Reading, Ranking]:
+    def run(self) -> tuple[Kept, Ranking]:
         floors = self._graph.layer("floor")
-        on = self._narrow("floor", _Kept(floors, floors))
-        rooms = self._narrow("room", _Kept(self._below(on.targets), self._below(on.anchors)))
-        places = self._narrow("location", _Kept(self._parts(rooms.targets), self._parts(rooms.anchors)))
-        things = self._narrow("object", _Kept(self._things(places.targets), self._things(places.anchors)))
+        on = self._narrow("floor", _Level(floors, floors))
+        rooms = self._narrow("room", _Level(self._below(on.targets), self._below(on.anchors)))
+        places = self._narrow("location", _Level(self._parts(rooms.targets), self._parts(rooms.anchors)))
+        things = self._narrow("object", _Level(self._things(places.targets), self._things(places.anchors)))
         targets = list(things.targets)[:MOST_TARGETS]
         anchors = list(things.anchors)[:MOST_ANCHORS]  # may be targets, too: "the chair beside the other chair"
         if len(targets) < len(things.targets):
             self._notes.append(f"of {len(things.targets)} targets the first {len(targets)} were compared")
-        reading = Reading(
+        reading = Kept(
             floors=on.ids,
             rooms=rooms.ids,
             locations=tuple(one for one in places.ids if one.startswith("L")),
@@ -115,7 +112,7 @@ class _Flow:
     def _things(self, places: Sequence[Node]) -> list[Node]:
         return [node for place in places for node in self._graph.children(place.id) if node.layer == "object"]
 
-    def _narrow(self, layer: str, within: _Kept) -> _Kept:
+    def _narrow(self, layer: str, within: _Level) -> _Level:
         """Let the model keep some of a level; all of it where there is nothing to choose from."""
         nodes = within.both
         nothing_to_choose = len(nodes) < 2 if layer != "object" else not nodes
@@ -133,7 +130,7 @@ class _Flow:
         by_id = self._graph.nodes
         anchors = [by_id[one] for one in found.anchors]
         # where no place is named for the anchors, they are looked for where the target is
-        return _Kept([by_id[one] for one in found.targets], anchors or ([] if layer == "object" else within.targets))
+        return _Level([by_id[one] for one in found.targets], anchors or ([] if layer == "object" else within.targets))
 
     def _ranked(self, nodes: Sequence[Node]) -> list[Node]:
         """The nodes by how well words of the question name them, or what they hold; equal ones by id."""
@@ -186,14 +183,16 @@ class _Flow:
         if len(shown) < len(targets):
             ranking.notes.append(f"of {len(targets)} targets the first {len(shown)} fit the last call")
         if anchors:
-            seen_from = viewpoint_of(self._graph, targets[0], self._asker_world).source
+            seen_from = self._grounder.viewpoint(targets[0]).source
             ranking.notes.append(f"left, right, front and behind are meant from the {seen_from}")
         ranking.notes.append(f"the language model chose {chosen} among {listed}: {reason}")
         if chosen != NONE:
             order = sorted(targets, key=lambda node: node.id != chosen)
             ranking.candidates = [
                 Candidate(
-                    node, 1.0 if node.id == chosen else OTHERS, [f"{label(node)} is {one}" for one in found[node.id]]
+                    node,
+                    1.0 if node.id == chosen else OTHERS,
+                    [f"{node.name} {node.id} is {one}" for one in found[node.id]],
                 )
                 for node in order
             ]
@@ -203,7 +202,7 @@ class _Flow:
         self, targets: Sequence[Node], anchors: Sequence[Node]
     ) -> tuple[list[Entry], dict[str, list[str]]]:
         """The targets with as many edges as fit one call, else fewer targets; and all edges by target."""
-        found = {node.id: edges(self._graph, node, anchors, self._asker_world, MOST_EDGES) for node in targets}
+        found = {node.id: edges(self._grounder, node, anchors, MOST_EDGES) for node in targets}
         for most in range(MOST_EDGES, -1, -1):
             entries = [Entry(node.id, self._with_edges(node, found[node.id][:most])) for node in targets]
             if self._dialogue.fits("deduce_ground", entries):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from placegraph.nodes.grounding.ground import Candidate
+from placegraph.nodes.grounding.ranking import Candidate
 from placegraph.nodes.grounding.words import tokens
 from placegraph.runtime.scene_graph import SceneGraph
 

@@ -1,8 +1,8 @@
 import pytest
 
 from placegraph.nodes.grounding.decide import settle
-from placegraph.nodes.grounding.ground import Candidate, Ranking
 from placegraph.nodes.grounding.llm import LanguageModel
+from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.runtime.errors import QueryError
 
 
