@@ -52,9 +52,10 @@ class Grounding(Node):
                 raise ConfigError(f"[nodes.grounding] {setting}: names of letters and digits expected, found {wrong}")
         path = Path(config.model_path) if config.model_path else None
         self._model = LanguageModel(path, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed)
-        self._namer = Namer(self._model, config.room_types, config.location_types)
+        encode = TextEncoder().encode
+        self._namer = Namer(self._model, encode, config.room_types, config.location_types)
         place_types = (*config.room_types, *config.location_types)
-        names = Names(TextEncoder().encode)
+        names = Names(encode)
         self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model)
         self._graph: SceneGraph | None = None
         self._revision = -1

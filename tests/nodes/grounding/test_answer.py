@@ -42,6 +42,7 @@ def test_what_is_no_question_gets_a_reason(node, ask, text, reason):
 @pytest.mark.parametrize(
     ("kwargs", "reason"),
     [({"mode": "poem"}, "mode 'poem'"), ({"mode": "program"}, "needs the language model"),
+     ({"mode": "deductive"}, "needs the language model"),
      ({"k": 0}, "k = 0"), ({"viewpoint": (np.nan, 1, 1)}, "viewpoint"),
      ({"viewpoint": (np.inf, 1, 1)}, "viewpoint")],
 )  # fmt: skip

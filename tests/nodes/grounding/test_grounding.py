@@ -121,3 +121,12 @@ def test_the_model_reads_whatever_was_asked_before(node, ask, graph_message, hou
     for answer in answers:
         assert answer["status"] in ("found", "not_in_map")
         assert (answer["parse"]["reader"], answer["llm_calls"]) == ("model", 1)
+
+
+def test_the_deductive_mode_is_asked_for_by_its_name(node, ask, graph_message, house):
+    node.step(graph_message(house))
+    answer = ask(node, "find the lamp upstairs", mode="deductive")
+    assert answer["status"] in ("found", "not_in_map")
+    assert answer["evidence"][0] == "read level by level (deductive mode)"
+    assert answer["llm_calls"] >= 2
+    assert set(answer["parse"]) == {"floors", "rooms", "locations", "targets", "anchors"}
