@@ -18,7 +18,22 @@ RING_OF_RUNTIME = {
         ("errors", "declaration", "messages", "topics", "geometry", "place_graph", "scene_graph", "route"), 0
     ),
     **dict.fromkeys(
-        ("codec", "join", "health", "flow", "question", "reply", "object_list", "scene", "recording", "node", "surface", "registration", "features"), 1
+        (
+            "codec",
+            "join",
+            "health",
+            "flow",
+            "question",
+            "reply",
+            "object_list",
+            "scene",
+            "recording",
+            "node",
+            "surface",
+            "registration",
+            "features",
+        ),
+        1,
     ),
     **dict.fromkeys(("config", "bus", "desk", "process", "launch", "inline", "log"), 3),
 }

@@ -21,7 +21,7 @@ from placegraph.nodes.grounding.notation import write
 from placegraph.nodes.grounding.parse import check_text, draft
 from placegraph.nodes.grounding.program import object_grammar, read_choice
 from placegraph.nodes.grounding.ranking import Ranking
-from placegraph.nodes.grounding.reading import read_request
+from placegraph.nodes.grounding.reading import read_by_examples, read_request
 from placegraph.nodes.grounding.reply import found, not_in_map
 from placegraph.nodes.grounding.schema import Program, Thing
 from placegraph.nodes.grounding.select import Scope, places_called
@@ -107,7 +107,8 @@ class Reasoner:
         if not self._use_model:
             raise QueryError("mode 'program' needs the language model, which use_model = false switches off")
         check_text(question.text)
-        reading = read_request(self._model, question.text)
+        read = read_request if self._model.adapter_path else read_by_examples
+        reading = read(self._model, question.text)
         confidence = round(float(reading.confidence), 4)
         if confidence < LEAST_CONFIDENCE:
             reasoned = self._by_levels(graph, question)

@@ -100,8 +100,8 @@ class Dialogue:
     def _ask(self, step: str, entries: Sequence[Entry], grammar: str, longest: int) -> str:
         """The only place where this mode calls the model."""
         opening, middle, closing = self._parts(step)
-        reply = self._model.complete(_filled(middle, entries), grammar, longest, opening=opening, closing=closing).text
-        return str(reply)
+        reply = self._model.complete(_filled(middle, entries), grammar, longest, opening=opening, closing=closing)
+        return reply.text
 
     def _pages(self, step: str, entries: Sequence[Entry], longest: int) -> list[list[Entry]]:
         """The entries in lists that fit the context, one entry at least in each."""

@@ -85,7 +85,9 @@ def _print_wrong(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) ->
     for scene, given in zip(scenes, replies, strict=True):
         for asked, reply in zip(scene.questions, given, strict=True):
             if reply.object_id != f"O{asked.target}":
-                print(f"{scene.name} {asked.form}: {asked.text!r} -> {reply.object_id or reply.status}, O{asked.target}")
+                print(
+                    f"{scene.name} {asked.form}: {asked.text!r} -> {reply.object_id or reply.status}, O{asked.target}"
+                )
 
 
 def _text(found: dict[str, dict[str, Any]], forms: bool) -> str:

@@ -1,7 +1,7 @@
 import pytest
 
 from placegraph.nodes.grounding.decide import settle
-from placegraph.nodes.grounding.llm import LanguageModel
+from placegraph.nodes.grounding.llm import LanguageModel, Reply
 from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.runtime.errors import QueryError
 
@@ -15,7 +15,7 @@ class Canned(LanguageModel):
 
     def complete(self, text, grammar, max_tokens, opening="", closing=""):
         self.asked.append((opening + text + closing, grammar))
-        return self.reply
+        return Reply(self.reply, 0.0)
 
 
 @pytest.fixture

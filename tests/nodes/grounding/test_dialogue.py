@@ -3,7 +3,7 @@ import json
 import pytest
 
 from placegraph.nodes.grounding.dialogue import MOST_CALLS, MOST_CHOSEN, MOST_REASON, Dialogue, Entry
-from placegraph.nodes.grounding.llm import LanguageModel
+from placegraph.nodes.grounding.llm import LanguageModel, Reply
 from placegraph.runtime.errors import QueryError
 
 STEP = "deduce_objects"
@@ -31,7 +31,7 @@ class Counting(LanguageModel):
         assert self.fits(opening, text, max_tokens, closing)
         assert len(json.dumps(self.reply)) <= max_tokens
         self.asked.append((opening + text + closing, grammar))
-        return json.dumps(self.reply)
+        return Reply(json.dumps(self.reply), 0.0)
 
 
 def nothing():
