@@ -29,6 +29,7 @@ from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 MOST_PAIRS = 600_000  # departs: of targets and anchors judged at once; bounds memory on large maps
 FAIR_TRUST = 0.5  # departs: what is only likely to be called so decides half
 SPARE_TRUST = 0.3  # departs: "the cup on the table near the window" with one table: the cup near the window
+HINT_TRUST = 0.5  # departs: "in the bathroom" of a map without rooms: near the toilet
 SAME_PLACE = 0.9  # departs: places whose score is at least this share of the best are meant together
 NOT_THINGS = ("wall", "floor", "ceiling")  # never meant by "something", "what is under the bed"
 ANY_NOUN = ("", ANYTHING, SAME_KIND, "object", "item", "something", "anything")
@@ -87,6 +88,9 @@ class Conditions:
                 self._apply_group(weighing, condition)
             else:
                 hint = self._apply_relation(weighing, condition, target) or hint
+        if thing is self.scope.thing:
+            for condition in self.scope.hints:
+                self._apply_hint(weighing, condition, target, HINT_TRUST)
         for condition in own:
             if condition.kind == "rank":
                 self._apply_rank(weighing, condition, target, hint)
@@ -127,11 +131,16 @@ class Conditions:
     def _apply_spare(self, weighing: Weighing, anchor: Thing, target: Thing) -> None:
         """Let what is said of an anchor that needs it not (there is one such thing) speak for the target, a little."""
         for condition in (one for one in anchor.conditions if one.kind == "relation" and not one.negated):
-            found = [self.anchors(inner, target, len(weighing)) for inner in condition.things]
-            things = [one for one in found if one is not None]
-            if things and len(things) == len(found):
-                outcome = related(condition, weighing.boxes, things, self.layout, self.views)
-                weighing.hinted(outcome.values, outcome.sentence, SPARE_TRUST)
+            self._apply_hint(weighing, condition, target, SPARE_TRUST)
+
+    def _apply_hint(self, weighing: Weighing, condition: Condition, target: Thing, trust: float) -> None:
+        """Let a relation speak for what it fits, without force."""
+        found = [self.anchors(inner, target, len(weighing)) for inner in condition.things]
+        things = [one for one in found if one is not None]
+        if things and len(things) == len(found):
+            outcome = related(condition, weighing.boxes, things, self.layout, self.views)
+            values = 1 - outcome.values if condition.negated else outcome.values
+            weighing.hinted(values, outcome.sentence, trust)
 
     def _apply_rank(self, weighing: Weighing, condition: Condition, target: Thing, hint: Boxes | None) -> None:
         anchors = [self.anchors(inner, target, len(weighing)) for inner in condition.things]

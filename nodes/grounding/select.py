@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from placegraph.nodes.grounding.names import Fit, Names
+from placegraph.nodes.grounding.names import HEAD, Fit, Names
 from placegraph.nodes.grounding.notation import write
-from placegraph.nodes.grounding.phrases import ORDINALS
+from placegraph.nodes.grounding.phrases import ORDINALS, WHOLE_MAP
 from placegraph.nodes.grounding.schema import Condition, Thing
 from placegraph.nodes.grounding.words import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph
@@ -47,7 +47,7 @@ class Scope:
     thing: Thing = field(default_factory=Thing)
     notes: list[str] = field(default_factory=list)
     sure: bool = True
-    narrowed: bool = False  # by a place that is in the map
+    hints: list[Condition] = field(default_factory=list)  # what speaks for the target without force
 
 
 def narrow(graph: SceneGraph, target: Thing, names: Names, rank_places: RankPlaces) -> Scope:
@@ -86,6 +86,8 @@ def _by_room(
 ) -> list[Condition]:
     """Narrow by one place; returns what is left of it for geometry to judge."""
     place = condition.things[0]
+    if place.noun in WHOLE_MAP and not place.conditions:
+        return []  # in the house, in the room
     floors = [inner for inner in place.conditions if inner.name == "floor"]
     for inner in floors:
         _by_floor(graph, scope, inner)
@@ -97,16 +99,21 @@ def _by_room(
         scope.notes.append(f"looked {'outside' if condition.negated else 'in'} {write(place)}: {listed}")
         _keep_below(graph, scope, places, outside=condition.negated)
         return []
-    if names.is_known(place.noun, graph.layer("object")):  # the closet, the shower: a thing that one can be in
+    if _is_thing(place.noun, graph, names):  # the closet, the shower: a thing that one can be in
         return [condition.model_copy(update={"name": "in"})]
     scope.sure = False
     typical = next((noun for noun in _typical(place.noun, names) if names.is_known(noun, scope.objects)), "")
     if typical:
         scope.notes.append(f"no place in the map is called {place.noun}; took what is near the {typical} for it")
-        near = Condition(name="near", things=(Thing(noun=typical),), negated=condition.negated)
-        return [near]
+        scope.hints.append(Condition(name="near", things=(Thing(noun=typical),), negated=condition.negated))
+        return []
     scope.notes.append(f"no place in the map is called {place.noun}; looked everywhere else")
     return []
+
+
+def _is_thing(noun: str, graph: SceneGraph, names: Names) -> bool:
+    """Whether an object is called so by its words; likeness alone makes a toilet of a bathroom."""
+    return any(fit.score >= HEAD for fit in names.named(noun, graph.layer("object")))
 
 
 def _typical(noun: str, names: Names) -> tuple[str, ...]:
@@ -115,9 +122,7 @@ def _typical(noun: str, names: Names) -> tuple[str, ...]:
 
 def _names_place(graph: SceneGraph, thing: Thing, names: Names) -> bool:
     """Whether "in (X)" speaks of a room: a place is called so and no object, or it is a word for a kind of room."""
-    if thing.noun in ("", "room"):
-        return False
-    if names.is_known(thing.noun, graph.layer("object")):
+    if thing.noun in ("", "room") or _is_thing(thing.noun, graph, names):
         return False
     places = [*graph.layer("room"), *graph.layer("location")]
     return bool(places_called(thing.noun, places, names)) or bool(_typical(thing.noun, names))
@@ -131,7 +136,6 @@ def _keep_below(graph: SceneGraph, scope: Scope, tops: Sequence[Node], *, outsid
 
     scope.objects = [node for node in scope.objects if is_kept(node)]
     scope.places = [node for node in scope.places if is_kept(node)]
-    scope.narrowed = True
 
 
 def places_called(name: str, places: Sequence[Node], names: Names) -> list[Fit]:

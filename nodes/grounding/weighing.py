@@ -41,9 +41,7 @@ class Weighing:
         self.peers: Mask = told
         self.scores = np.where(told, self.scores, OFF_NAME * self.scores)
         self.holds: Mask = groups[-1]
-        self._ranked: Mask | None = (
-            None  # what all ranks are said of: a second rank is not among the winners of the first
-        )
+        self._ranked: Mask | None = None  # what all ranks are said of
 
     def __len__(self) -> int:
         return len(self.boxes)

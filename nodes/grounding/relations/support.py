@@ -23,6 +23,7 @@ CONTACT_M = 0.15  # departs: gap between what lies and what carries it, at which
 STANDS_SHARE = 0.5  # departs: what stands in the upper half of a box stands on it: a bed's box includes its headboard
 HANGS_M, HANGS_SHARE = 0.1, 0.7  # departs: what touches an upright thing, off its bottom, hangs on it ("on the wall")
 WITHIN_SHARE, ON_SHARE = 0.8, 0.9  # departs: how well what is inside is "on", and what is on top is "in"
+SPOT_M, CORNER_M = 0.02, 0.8  # departs: "in the corner": a corner or middle of a room is no box that holds things
 OFF_GROUND_M = 0.3
 WALL_M = 0.4  # departs: room boxes end inside the wall or beyond it
 ASIDE_M = 0.3  # departs: a picture hangs above the sofa that it does not overlap; half as likely at this distance
@@ -105,6 +106,9 @@ def judge(case: Case) -> Fits:
         if name == "with":
             gap = apart_m(gaps)
             values = np.maximum(values, np.maximum(0.9 * halving(gap, PART_M), 0.7 * halving(gap, BESIDE_M)))
+    spots = np.array([not one for one in anchors.ids], bool) & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
+    if name in ("in", "on"):
+        values = np.where(spots[None], halving(flat_m(gaps), CORNER_M), values)
     return Fits(values, lambda i, j: _sentence(case, i, j))
 
 

@@ -41,8 +41,7 @@ def test_what_is_no_question_gets_a_reason(node, ask, text, reason):
 
 @pytest.mark.parametrize(
     ("kwargs", "reason"),
-    [({"mode": "poem"}, "mode 'poem'"), ({"mode": "program"}, "needs the language model"),
-     ({"mode": "deductive"}, "needs the language model"),
+    [({"mode": "poem"}, "mode 'poem'"), ({"mode": "deductive"}, "needs the language model"),
      ({"k": 0}, "k = 0"), ({"viewpoint": (np.nan, 1, 1)}, "viewpoint"),
      ({"viewpoint": (np.inf, 1, 1)}, "viewpoint")],
 )  # fmt: skip
@@ -71,6 +70,10 @@ def test_the_parse_is_in_the_answer(node, ask):
     parse = ask(node, "the red chair near the fridge")["parse"]
     assert (parse["text"], parse["reader"], parse["confidence"]) == ("chair; is red; near (fridge)", "rules", None)
     assert Program.model_validate_json(json.dumps(parse["program"])).target == read(parse["text"])
+
+
+def test_without_a_model_the_rules_read(node, ask):
+    assert ask(node, "the red chair", mode="program")["parse"]["reader"] == "rules"
 
 
 def test_a_program_that_is_given_is_executed(house, names, question_of):

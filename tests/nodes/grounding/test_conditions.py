@@ -10,8 +10,8 @@ from placegraph.nodes.grounding.schema import CONDITIONS, MOST_DEPTH, Condition,
 from placegraph.runtime.scene_graph import SceneGraph
 
 NOUNS = (
-    "thing", "", "one", "chairs", "table", "window", "wall", "floor", "corner", "room", "ceiling", "door", "enter", "bed",
-    "zebra", "o3", "r1", "kitchen", "lamp", "center", "nightstand",
+    "thing", "", "one", "chairs", "table", "window", "wall", "floor", "corner", "room", "ceiling", "door", "enter",
+    "bed", "zebra", "o3", "r1", "kitchen", "lamp", "center", "nightstand",
 )  # fmt: skip
 WORDS = ("red", "dark brown", "big", "burnt", "upstairs", "second floor", "sit on", "wooden", "9")
 

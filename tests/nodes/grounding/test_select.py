@@ -3,6 +3,7 @@ import pytest
 
 from placegraph.nodes.grounding.ground import Grounder
 from placegraph.nodes.grounding.notation import read, write
+from placegraph.nodes.grounding.schema import Thing
 from placegraph.nodes.grounding.select import floors_called
 from placegraph.runtime.scene_graph import SceneGraph
 
@@ -72,7 +73,8 @@ def test_a_thing_that_one_can_be_in_is_left_to_geometry(names, house):
 def test_a_room_without_a_node_is_where_its_typical_things_are(names, room_of):
     graph = room_of(("toilet", (1, 1, 0.4), (0.4, 0.6, 0.8)), ("bed", (5, 4, 0.3), (2, 2, 0.6)))
     scope = narrowed(graph, names, "mirror; not room (bathroom)")
-    assert write(scope.thing) == "mirror; not near (toilet)"
+    assert write(Thing(noun="mirror", conditions=tuple(scope.hints))) == "mirror; not near (toilet)"
+    assert write(scope.thing) == "mirror"
     assert (scope.sure, len(scope.objects)) == (False, 2)
     assert "toilet" in scope.notes[0]
 

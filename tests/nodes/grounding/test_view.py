@@ -12,8 +12,10 @@ CENTER = ("room centre", [3.0, 2.5])
 def layout(room_of):
     """A room of 6 x 5 m: a bed with its head to the west, a tv on the east wall, two windows in the north wall."""
     return layout_of(room_of(
-        ("wall", (3, 2.5, 1.25), (6, 5, 2.5)), ("bed", (1.1, 1, 0.3), (2.0, 1.6, 0.6)), ("tv", (5.95, 1, 1), (0.1, 1.2, 0.7)),
-        ("window", (1, 4.95, 1.5), (1, 0.1, 1)), ("window", (4, 4.95, 1.5), (1, 0.1, 1)), ("stool", (3, 2.5, 0.3), (0.4, 0.4, 0.6)),
+        ("wall", (3, 2.5, 1.25), (6, 5, 2.5)), ("bed", (1.1, 1, 0.3), (2.0, 1.6, 0.6)),
+        ("tv", (5.95, 1, 1), (0.1, 1.2, 0.7)),
+        ("window", (1, 4.95, 1.5), (1, 0.1, 1)), ("window", (4, 4.95, 1.5), (1, 0.1, 1)),
+        ("stool", (3, 2.5, 0.3), (0.4, 0.4, 0.6)),
     ))  # fmt: skip
 
 

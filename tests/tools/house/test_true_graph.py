@@ -62,6 +62,12 @@ def test_every_question_has_a_program_of_its_own_words() -> None:
 def test_forms_mean_what_they_say(form: str, part: str) -> None:
     programs = [one.program for one in asked() if one.form == form]
     assert programs and all(part in program for program in programs)
+    for one in (one for one in asked() if one.form in ("two anchors", "chain", "between")):
+        anchors = {house().items[k].item.name for k in one.anchors}
+        conditions = [*read(one.program).conditions]
+        inner = [c for outer in conditions for thing in outer.things for c in thing.conditions]
+        nouns = {thing.noun for c in (*conditions, *inner) for thing in c.things if c.name != "room"}
+        assert len(nouns) >= min(len(anchors), 2), one.program
     views = [one for one in asked() if "from (" in one.program]
     assert views and all("from the door" in one.text.lower() for one in views)
 

@@ -56,7 +56,7 @@ def spoken(request: Request, random: np.random.Generator) -> tuple[str, tuple[in
     words = [_word(anchor.naming, random, UNSAID_ANCHOR) for anchor in request.anchors]
     tail = _reworded(" ".join(request.tails), random).format(*words)
     adjective = request.adjective
-    means = [condition.format(*words) for condition in request.means]
+    means = ["; ".join(request.means).format(*words)] if request.means else []
     if adjective:
         adjective = str(random.choice(OTHER_ADJECTIVES.get(adjective, (adjective,))))
         means = [*_meant(adjective), *means]
