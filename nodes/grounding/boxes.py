@@ -1,7 +1,7 @@
 """The things of a scene graph as arrays, so that one look at all pairs costs no loop.
 
 Row i is one thing: an object, a place, or what no map holds as an object but people name (a corner, a wall, the floor).
-Metres, world frame.
+Metres, in the building's frame: the world turned about z by -`Layout.yaw`, so that its walls lie along the axes.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from placegraph.nodes.grounding.squared import building_yaw, turned_box, turning
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 F64 = NDArray[np.float64]
@@ -82,6 +83,15 @@ class Layout:
     room_high: F64
     objects: I64  # rows
     places: I64
+    yaw: float = 0.0  # rad, of the building in the world
+
+    def from_world(self, xyz: F64) -> F64:
+        """(3,) from the world to the building's frame."""
+        return turning(-self.yaw) @ xyz
+
+    def to_world(self, xyz: F64) -> F64:
+        """(3,) from the building's frame to the world."""
+        return turning(self.yaw) @ xyz
 
     @cached_property
     def row(self) -> dict[str, int]:
@@ -137,15 +147,17 @@ def layout_of(graph: SceneGraph) -> Layout:
     places = [node for name in ("floor", "room", "location") for node in graph.layer(name)]
     nodes, rooms = (*objects, *places), tuple(graph.layer("room"))
     room_row = {room.id: i for i, room in enumerate(rooms)}
-    boxes = np.array([node.box for node in nodes]).reshape(-1, 2, 3)
-    room_boxes = np.array([node.box for node in (*rooms, graph.building)])
+    yaw = building_yaw(graph)
+    turn = turning(-yaw)[:2, :2]
+    boxes = np.array([turned_box(node, -yaw) if yaw else node.box for node in nodes]).reshape(-1, 2, 3)
+    room_boxes = np.array([turned_box(node, -yaw) if yaw else node.box for node in (*rooms, graph.building)])
     return Layout(
         nodes=nodes,
         all=Boxes(
             tuple(f"{node.name} {node.id}" for node in nodes), tuple(node.id for node in nodes),
             boxes[:, 0], boxes[:, 1],
-            np.array([node.oriented_box[6] if node.oriented_box else 0.0 for node in nodes]),
-            np.array([node.front or (np.nan, np.nan) for node in nodes]).reshape(-1, 2),
+            np.array([node.oriented_box[6] - yaw if node.oriented_box else 0.0 for node in nodes]),
+            np.array([node.front or (np.nan, np.nan) for node in nodes]).reshape(-1, 2) @ turn.T,
             np.array([room_row.get(graph.room_of(node.id), -1) for node in nodes], np.int64),
         ),
         rooms=rooms,
@@ -153,4 +165,5 @@ def layout_of(graph: SceneGraph) -> Layout:
         room_high=room_boxes[:, 1],
         objects=np.arange(len(objects)),
         places=np.arange(len(objects), len(nodes)),
+        yaw=yaw,
     )  # fmt: skip

@@ -56,7 +56,7 @@ class Grounder:
         self.graph, self.names = graph, names
         self.asker_world = asker_world
         self.layout = layout or layout_of(graph)
-        self.views = Views(self.layout, asker_world, heading_rad)
+        self.views = Views(self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw)
 
     def viewpoint(self, node: Node) -> Viewpoint:
         """From where a node is seen: the place that the request names, the asker's, else the centre of its room."""
@@ -65,7 +65,7 @@ class Grounder:
         if view is self.views.asker and view is not None:
             return Viewpoint("asker", self.asker_world)
         if view is not None:
-            return Viewpoint(view.source, np.array([*view.eye, height]))
+            return Viewpoint(view.source, self.layout.to_world(np.array([*view.eye, height])))
         room = self.graph.room_of(node.id)
         center = (self.graph.nodes[room] if room else self.graph.building).center
         return Viewpoint("room centre", center)

@@ -1,12 +1,10 @@
-"""A graph turned about z until the building's walls lie along the axes.
+"""A map turned about z until the building's walls lie along the axes.
 
 Odometry's frame begins as the camera stood, so a long sofa gets a far too large axis-aligned box, and next to, against
 and in the corner mean little. Departs: the paper compares centres, which do not care.
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,31 +30,21 @@ def building_yaw(graph: SceneGraph) -> float:
     return best if abs(best) >= LEAST_RAD else 0.0
 
 
-def turned(graph: SceneGraph, yaw: float) -> SceneGraph:
-    """The graph with all boxes and outlines turned by yaw rad about z; without ways, connections and approaches."""
-    turn = turning(yaw)
-    return SceneGraph.of(_turned(node, yaw, turn) for node in graph.nodes.values())
-
-
 def turning(yaw: float) -> F64:
     """(3, 3) rotation by yaw rad about z."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _turned(node: Node, yaw: float, turn: F64) -> Node:
-    footprint = node.footprint @ turn[:2, :2].T
-    front = tuple((turn[:2, :2] @ np.array(node.front)).tolist()) if node.front else ()
-    oriented = node.oriented_box
-    if oriented:
-        center = turn @ np.array(oriented[:3])
-        half = np.array(oriented[3:6]) / 2
-        reach = np.abs(turning(oriented[6] + yaw)) @ half
-        box = np.stack((center - reach, center + reach))
-        oriented = (*center.tolist(), *oriented[3:6], oriented[6] + yaw)
-    elif len(footprint):
-        box = np.array([[*footprint.min(axis=0), node.box[0, 2]], [*footprint.max(axis=0), node.box[1, 2]]])
-    else:
-        corners = np.array([[node.box[i, 0], node.box[j, 1]] for i in (0, 1) for j in (0, 1)]) @ turn[:2, :2].T
-        box = np.array([[*corners.min(axis=0), node.box[0, 2]], [*corners.max(axis=0), node.box[1, 2]]])
-    return replace(node, box=box, footprint=footprint, oriented_box=oriented, front=front, approach=None)
+def turned_box(node: Node, yaw: float) -> F64:
+    """(2, 3) axis-aligned box of a node turned by yaw rad about z: made anew from its own axes or its outline."""
+    turn = turning(yaw)
+    if node.oriented_box:
+        center = turn @ np.array(node.oriented_box[:3])
+        reach = np.abs(turning(node.oriented_box[6] + yaw)) @ np.array(node.oriented_box[3:6]) / 2
+        return np.stack((center - reach, center + reach))
+    outline = node.footprint
+    if not len(outline):
+        outline = np.array([[node.box[i, 0], node.box[j, 1]] for i in (0, 1) for j in (0, 1)])
+    outline = outline @ turn[:2, :2].T
+    return np.array([[*outline.min(axis=0), node.box[0, 2]], [*outline.max(axis=0), node.box[1, 2]]])
