@@ -168,7 +168,7 @@ class Process:
         for out in given:
             self._publish(out)
             if asked and isinstance(out, Answer):
-                self._desk.answer(parcel.sequence, out.json.encode())
+                self._desk.answer(parcel.sequence, out.json)
         if not asked and parcel.kind not in self.node.feedback:
             self._receipt(msgpack.packb([parcel.kind.__name__, parcel.sequence]), b"")
 

@@ -1,24 +1,54 @@
-"""The JSON that askers send and receive (README, "Asking"): request to Question message, and error replies."""
+"""What askers send (README, "Asking"): one JSON object, checked against `Request`, to a Question message."""
 
 from __future__ import annotations
 
 import json
-from typing import Any
+import math
+import reprlib
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
 
+MAX_BYTES = 65_536  # of a request; more is refused unread
 MAX_TEXT = 500  # characters; longer is not a request but a document
+MAX_ID = 100  # characters
 MAX_CANDIDATES = 50
 MAX_COORDINATE_M = 1e6  # no building is larger, and no sum of squares overflows
-MODES = ("program", "model")  # rules and the model where they leave off; the model's own parse and choice
-FIELDS = {"text", "id", "k", "mode", "viewpoint"}
+Mode = Literal["program", "rules", "deductive"]  # a reading by the model, by phrase rules, or a call for each level
+MODES: tuple[str, ...] = get_args(Mode)
+
+Number = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
+
+
+class Request(BaseModel):
+    """The fields of a request; each description says what is expected. `Request.model_json_schema()` is its schema."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
+    text: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=MAX_TEXT)] = Field(
+        description=f"words, not empty, at most {MAX_TEXT} characters"
+    )
+    id: Annotated[str, StringConstraints(max_length=MAX_ID)] = Field(
+        default="", description=f"at most {MAX_ID} characters of text"
+    )
+    pose: Annotated[list[Number], Field(min_length=3, max_length=4)] | None = Field(
+        default=None, description="[x, y, z] or [x, y, z, yaw]: metres and radians, world frame, finite"
+    )
+    k: int = Field(default=5, ge=1, le=MAX_CANDIDATES, description=f"a whole number from 1 to {MAX_CANDIDATES}")
+    mode: Mode = Field(default="program", description=f"one of {', '.join(MODES)}")
+
+
+FIELDS = tuple(Request.model_fields)
 
 
 def parse_request(payload: bytes, fallback_id: str = "") -> Question:
     """Read a request; raises QueryError naming the field that is wrong. A bare text that is no JSON is refused too."""
+    if len(payload) > MAX_BYTES:
+        raise QueryError(f"the request has {len(payload)} bytes; at most {MAX_BYTES} are read")
     try:
         request = json.loads(payload.decode("utf-8"))
     except UnicodeDecodeError:
@@ -27,55 +57,59 @@ def parse_request(payload: bytes, fallback_id: str = "") -> Question:
         raise QueryError('the request is not JSON; expected {"text": "..."}') from None
     if not isinstance(request, dict):
         raise QueryError(f'expected an object like {{"text": "..."}}, got {type(request).__name__}')
-    if unknown := sorted(set(request) - FIELDS):
-        raise QueryError(f"unknown field {unknown[0]!r}; there are: {', '.join(sorted(FIELDS))}")
-    return make_question(
-        request.get("text"),
-        question_id=request.get("id", fallback_id),
-        k=request.get("k", 5),
-        mode=request.get("mode", MODES[0]),
-        viewpoint=request.get("viewpoint"),
-    )
+    return question_of({"id": fallback_id} | request)
 
 
-def make_question(
-    text: Any, *, question_id: Any = "", k: Any = 5, mode: Any = "program", viewpoint: Any = None
-) -> Question:
-    """Check every part of a question; raises QueryError."""
-    if not isinstance(text, str) or not text.strip():
-        raise QueryError("text: expected words that are not empty")
-    if len(text) > MAX_TEXT:
-        raise QueryError(f"text: at most {MAX_TEXT} characters, got {len(text)}")
-    if not isinstance(question_id, str) or len(question_id) > 100:
-        raise QueryError("id: expected at most 100 characters of text")
-    for field, value in (("text", text), ("id", question_id)):
-        if any("\ud800" <= character <= "\udfff" for character in value):  # JSON can spell them, UTF-8 cannot
-            raise QueryError(f"{field}: half of a surrogate pair is no character")
-    if type(k) is not int or not 1 <= k <= MAX_CANDIDATES:
-        raise QueryError(f"k: expected a whole number from 1 to {MAX_CANDIDATES}")
-    if mode not in MODES:
-        raise QueryError(f"mode: expected one of {', '.join(MODES)}")
+def asked_id(payload: bytes) -> str:
+    """The id in a request, however wrong the rest of it; "" when there is none that could be sent back."""
+    try:
+        request = json.loads(payload) if len(payload) <= MAX_BYTES else None
+        return Request(text="-", id=request["id"]).id if isinstance(request, dict) and "id" in request else ""
+    except (ValueError, RecursionError):  # ValueError: not JSON, not UTF-8, or an id that breaks its rule
+        return ""
+
+
+def make_question(text: Any, *, question_id: Any = "", k: Any = 5, mode: Any = "program", pose: Any = None) -> Question:
+    """Check every part of a question; raises QueryError naming the field. pose: as in `Request`."""
+    return question_of({"text": text, "id": question_id, "k": k, "mode": mode, "pose": pose})
+
+
+def question_of(request: dict[str, Any]) -> Question:
+    """The Question of a request's fields; raises QueryError naming the field that is wrong."""
+    for field in sorted(set(request) - set(FIELDS)):
+        what = "it is called pose" if field == "viewpoint" else f"there are: {', '.join(sorted(FIELDS))}"
+        raise QueryError(f"unknown field {_shown(field)}; {what}")
+    try:
+        checked = Request.model_validate(request)
+    except ValidationError as error:
+        raise QueryError(_reason(error)) from None
+    pose = [*(checked.pose or ()), math.nan, math.nan, math.nan, math.nan]
+    x, y, z, yaw_rad = pose[:4]
     return Question(
         frame_id=-1,
         stamp_ns=0,
-        question_id=question_id,
-        text=text.strip(),
-        k=k,
-        mode=mode,
-        viewpoint_world=_viewpoint(viewpoint),
+        question_id=checked.id,
+        text=checked.text,
+        k=checked.k,
+        mode=checked.mode,
+        viewpoint_world=np.array([x, y, z]),
+        heading_rad=yaw_rad,
     )
 
 
-def _viewpoint(value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    if value is None:
-        return np.full(3, np.nan)
-    numbers = value if isinstance(value, (list, tuple)) else []
-    if len(numbers) != 3 or not all(type(v) in (int, float) and abs(v) <= MAX_COORDINATE_M for v in numbers):
-        raise QueryError("viewpoint: expected [x, y, z] in metres, world frame")
-    return np.array(numbers, float)
+def _reason(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    field = str(first["loc"][0])
+    expected = f"{field}: expected {Request.model_fields[field].description}"
+    if first["type"] == "missing":
+        return expected
+    if first["type"] == "string_too_long":
+        return f"{expected}, got {len(first['input'])}"
+    if first["type"] == "string_unicode":  # JSON can spell half of a surrogate pair, UTF-8 cannot
+        return f"{expected}, got half of a surrogate pair, which is no character"
+    return f"{expected}, got {_shown(first['input'])}"
 
 
-def error_reply(question_id: str, reason: str) -> bytes:
-    """The reply when there can be no answer: same shape as any other, `status` is "error"."""
-    reply = {"status": "error", "question_id": question_id, "object_id": None, "box": None, "error": reason}
-    return json.dumps(reply, sort_keys=True).encode()
+def _shown(value: object) -> str:
+    """The start of a value as it can be sent: half a surrogate pair, which UTF-8 cannot spell, as its number."""
+    return reprlib.repr(value).encode("utf-8", "backslashreplace").decode()

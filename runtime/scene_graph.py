@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -111,7 +112,7 @@ class SceneGraph:
         listed, joined = list(nodes), list(connections)
         ids = [*(node.id for node in listed), *(connection.id for connection in joined)]
         if len(set(ids)) != len(ids):
-            raise SchemaError(f"scene graph: id {next(i for i in ids if ids.count(i) > 1)} appears more than once")
+            raise SchemaError(f"scene graph: id {Counter(ids).most_common(1)[0][0]} appears more than once")
         graph = cls(
             nodes={node.id: node for node in sorted(listed, key=lambda node: id_key(node.id))},
             connections={one.id: one for one in sorted(joined, key=lambda one: connection_key(one.id))},
@@ -187,8 +188,12 @@ class SceneGraph:
 
     def descendants(self, node_id: str, layer: str) -> list[Node]:
         """All nodes of `layer` below a node, by id number."""
-        below = [node for node in self.layer(layer) if node_id in {p.id for p in self.path(node.id)[:-1]}]
-        return below
+        found, tops = [], [node_id]
+        for top in tops:  # grows while it is walked
+            below = self.children(top)
+            tops += [node.id for node in below]
+            found += [node for node in below if node.layer == layer]
+        return sorted(found, key=lambda node: id_key(node.id))
 
     def path(self, node_id: str) -> list[Node]:
         """From the building down to the node itself."""

@@ -20,6 +20,7 @@ RING_OF_RUNTIME = {
     **dict.fromkeys(
         ("codec", "join", "health", "flow", "question", "recording", "node", "surface", "registration", "features"), 1
     ),
+    **dict.fromkeys(("reply", "object_list", "scene"), 1),
     **dict.fromkeys(("config", "bus", "desk", "process", "launch", "inline", "log"), 3),
 }
 RING_OF_FOLDER = {"models_onnx": 1, "nodes": 2, "tools": 4, "configs": 4}

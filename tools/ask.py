@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,77 +11,81 @@ import typer
 
 from placegraph.runtime.bus import Bus, BusConfig
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.messages import Answer, Graph
-from placegraph.runtime.node import Context, build_node
 from placegraph.runtime.question import make_question
-from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.map_folder import RUN, find_graph, read_config
+from placegraph.tools.answerer import Answerer
+from placegraph.tools.batch import Batch, answer_all
 
 NOT_FOUND = 3
 
 
 def ask(
     where: Annotated[
-        str, typer.Argument(metavar="MAP|live", help="A map folder, a graph file, or `live`: the running system.")
-    ],
+        str, typer.Argument(metavar="MAP|live", help="A map folder, a graph file, an object list; live: a running one.")
+    ] = "",
     text: Annotated[
         str, typer.Argument(metavar="TEXT", help='What to look for, e.g. "the vase near the window upstairs".')
-    ],
+    ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print the reply as JSON (README, Asking).")] = False,
     k: Annotated[int, typer.Option(help="How many candidates to list.")] = 5,
-    mode: Annotated[str, typer.Option(help="program: by rules first; model: by the language model.")] = "program",
-    viewpoint: Annotated[str, typer.Option(help="Where the asker stands: x,y,z in metres, world frame.")] = "",
+    mode: Annotated[
+        str, typer.Option(help="program: read by the model; rules: by phrases; deductive: a call for each level.")
+    ] = "program",
+    pose: Annotated[
+        str, typer.Option(help="Where the asker stands: x,y,z[,yaw]; metres, degrees from x, world frame.")
+    ] = "",
+    graph: Annotated[Path | None, typer.Option(help="With --batch: what is asked, as MAP.")] = None,
+    batch: Annotated[Path | None, typer.Option(help="Instead of TEXT: a file of questions (README, Asking).")] = None,
+    out: Annotated[Path | None, typer.Option(help="With --batch: the file for the answers.")] = None,
     endpoint: Annotated[str, typer.Option(help="live: where the hub listens.")] = BusConfig().endpoint,
     prefix: Annotated[str, typer.Option(help="live: first part of the keys.")] = BusConfig().prefix,
     timeout_s: Annotated[float, typer.Option(help="live: how long to wait for the reply.")] = 35.0,
 ) -> None:
-    """Find an object in a saved map or in the running system.
+    """Find an object in a saved map, an object list or the running system; with --batch, answer a file of questions.
 
-    Exit status: 0 found, 3 not in the map, 1 the question could not be answered, 2 wrong usage.
+    Exit status: 0 found, or a batch done; 3 not in the map, 1 the question could not be answered, 2 wrong usage.
     """
-    position = _numbers(viewpoint) if viewpoint else None
+    if batch is not None:
+        if where or text or as_json or pose or out is None:
+            raise typer.BadParameter("takes --out, and no MAP, TEXT, --json or --pose", param_hint="--batch")
+        _ask_all(batch, out, graph, k, mode)
+        return
+    if graph is not None or out is not None or not where:
+        raise typer.BadParameter("expected MAP TEXT, or --batch QUESTIONS --out ANSWERS [--graph MAP]")
     # refuses what no map can answer
-    question = make_question(text, question_id="Q1", k=k, mode=mode, viewpoint=position)
-    began = time.monotonic()
+    standing = _pose(pose)
+    question = make_question(text, question_id="Q1", k=k, mode=mode, pose=standing)
     if where == "live":
-        request = {"text": question.text, "k": k, "mode": mode} | ({"viewpoint": position} if position else {})
+        request = {"text": question.text, "k": k, "mode": mode, "pose": standing}
         with Bus(BusConfig(endpoint=endpoint, prefix=prefix)) as bus:
             reply = json.loads(bus.ask(json.dumps(request).encode(), timeout_s, "ask"))
     else:
-        reply = _ask_map(Path(where), question)
-    reply["ms"] = round((time.monotonic() - began) * 1000)
+        with Answerer() as answerer:
+            reply = answerer.ask(Path(where), question)
     print(json.dumps(reply, sort_keys=True) if as_json else _in_words(reply))
     if reply["status"] != "found":
         raise typer.Exit(NOT_FOUND if reply["status"] == "not_in_map" else 1)
 
 
-def _ask_map(path: Path, question: Any) -> dict[str, Any]:
-    graph = SceneGraph.load(find_graph(path))
-    settings: dict[str, Any] = {}
-    context = Context()
-    if path.is_dir() and (path / RUN).exists():  # ask the map the way its run would have answered
-        config = read_config(path)
-        settings = config.nodes.get("grounding", {})
-        context = Context(model_dirs=tuple(config.run.model_dirs), threads=config.run.threads)
-    node = build_node("grounding", settings, context)
-    try:
-        node.start()
-        node.step(Graph(frame_id=-1, stamp_ns=0, revision=0, final=True, named=True, json=graph.to_json()))
-        answers = [message for message in node.step(question) if isinstance(message, Answer)]
-    finally:
-        node.stop()
-    if not answers:
-        raise QueryError("the grounding node gave no answer")
-    reply: dict[str, Any] = json.loads(answers[0].json)
-    return reply
+def _ask_all(questions: Path, out: Path, graph: Path | None, k: int, mode: str) -> None:
+    make_question("-", k=k, mode=mode)  # a wrong option is no fault of every line
+    with Answerer() as answerer:
+        if graph is not None:
+            answerer.check(graph)
+        tally = answer_all(Batch(answerer, questions.parent, graph, k=k, mode=mode), questions, out)
+    print(f"{tally.in_words()}: {out}")
 
 
-def _numbers(text: str) -> list[float]:
+def _pose(text: str) -> list[float] | None:
+    """x, y, z in metres and the yaw, where there is one, in radians; None without a text."""
+    if not text:
+        return None
     try:
-        x, y, z = (float(part) for part in text.split(","))
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        raise QueryError(f"viewpoint: expected x,y,z in metres, world frame, got {text!r}") from None
-    return [x, y, z]
+        numbers = []
+    if len(numbers) not in (3, 4):
+        raise QueryError(f"pose: expected x,y,z or x,y,z,yaw in metres and degrees, world frame, got {text!r}")
+    return [*numbers[:3], *map(math.radians, numbers[3:])]
 
 
 def _in_words(reply: dict[str, Any]) -> str:

@@ -27,6 +27,7 @@ from placegraph.tools import (
     run,
     view,
 )
+from placegraph.tools.evaluate.grounding_table import evaluate_grounding
 from placegraph.tools.evaluate.networks import networks
 from placegraph.tools.house.command import house
 from placegraph.tools.train import command as train
@@ -58,6 +59,7 @@ COMMANDS: tuple[Callable[..., None], ...] = (
 for command in COMMANDS:
     app.command()(command)
 app.command("evaluate-networks")(networks)
+app.command("evaluate-grounding")(evaluate_grounding)
 app.add_typer(models.app, name="models")
 app.add_typer(train.app, name="train")
 

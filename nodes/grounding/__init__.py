@@ -12,11 +12,13 @@ import numpy as np
 from pydantic import Field
 
 from placegraph.models_onnx.text import TextEncoder
-from placegraph.nodes.grounding.answer import Reasoner, error_answer, to_json
+from placegraph.nodes.grounding.answer import Reasoner
 from placegraph.nodes.grounding.llm import N_CTX, LanguageModel
 from placegraph.nodes.grounding.names import Names
 from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES, Namer
 from placegraph.nodes.grounding.program import SAFE
+from placegraph.nodes.grounding.reading import default_adapter_path
+from placegraph.nodes.grounding.reply import error_answer, to_json
 from placegraph.runtime.errors import ConfigError, QueryError
 from placegraph.runtime.messages import Answer, Graph, Message, PlaceNames, Question
 from placegraph.runtime.node import Context, Node, NodeConfig
@@ -26,7 +28,8 @@ from placegraph.runtime.scene_graph import SceneGraph
 class GroundingConfig(NodeConfig):
     """Settings of the grounding node."""
 
-    model_path: str = ""  # a GGUF file; empty: the packaged SmolLM2-135M-Instruct
+    model_path: str = ""  # a GGUF file; empty: the packaged SmolLM2-135M-Instruct, with its adapter
+    adapter_path: str = ""  # of a model of one's own, trained by `placegraph train reader`; empty: it reads by examples
     n_ctx: int = N_CTX  # tokens
     seed: int = 0
     name_places: bool = True  # False: rooms and locations stay without names
@@ -50,10 +53,14 @@ class Grounding(Node):
             if wrong or not types:
                 raise ConfigError(f"[nodes.grounding] {setting}: names of letters and digits expected, found {wrong}")
         path = Path(config.model_path) if config.model_path else None
-        self._model = LanguageModel(path, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed)
-        self._namer = Namer(self._model, config.room_types, config.location_types)
+        adapter = Path(config.adapter_path) if config.adapter_path else None if path else default_adapter_path()
+        self._model = LanguageModel(
+            path, adapter_path=adapter, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed
+        )
+        encode = TextEncoder().encode
+        self._namer = Namer(self._model, encode, config.room_types, config.location_types)
         place_types = (*config.room_types, *config.location_types)
-        names = Names(TextEncoder().encode)
+        names = Names(encode)
         self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model)
         self._graph: SceneGraph | None = None
         self._revision = -1

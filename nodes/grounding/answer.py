@@ -1,37 +1,54 @@
-"""Question to answer: parse, select, relate, ground, and the reply as canonical JSON.
+"""Question to answer: read into a program, executed on the graph, and the reply's fields.
 
 Source: paper, "Deductive Hierarchical Reasoning Algorithm"; METHOD section 10.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placegraph.nodes.grounding.decide import choose, settle
-from placegraph.nodes.grounding.dictate import dictated
-from placegraph.nodes.grounding.ground import Candidate, Grounder, Ranking
+from placegraph.nodes.grounding.boxes import Layout, layout_of
+from placegraph.nodes.grounding.decide import settle
+from placegraph.nodes.grounding.deduce import deduce
+from placegraph.nodes.grounding.ground import Grounder
 from placegraph.nodes.grounding.llm import LanguageModel, prompt
 from placegraph.nodes.grounding.names import Names
-from placegraph.nodes.grounding.parse import draft
-from placegraph.nodes.grounding.program import Program, object_grammar, read_choice
-from placegraph.nodes.grounding.select import Scope, narrow, places_called
+from placegraph.nodes.grounding.notation import write
+from placegraph.nodes.grounding.parse import check_text, draft
+from placegraph.nodes.grounding.program import object_grammar, read_choice
+from placegraph.nodes.grounding.ranking import Ranking
+from placegraph.nodes.grounding.reading import read_by_examples, read_request
+from placegraph.nodes.grounding.reply import found, not_in_map
+from placegraph.nodes.grounding.schema import Program, Thing
+from placegraph.nodes.grounding.select import Scope, places_called
 from placegraph.nodes.grounding.words import normal_form, tokens
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
-from placegraph.runtime.place_graph import approach_to_dict
 from placegraph.runtime.question import MODES
-from placegraph.runtime.route import find_route
 from placegraph.runtime.scene_graph import ID_PATTERN, Node, SceneGraph
 
 MOST_OPTIONS = 24  # departs: names of things offered for a purpose; each costs the model 30 to 60 ms
+# Confidence below which a reading gives way to the deductive mode; 0: never. Departs: with SmolLM2-135M the deductive
+# mode answers less well than a doubtful reading and takes ten times as long; with a larger model raise it.
+LEAST_CONFIDENCE = 0.0
 CHOICE_TOKENS = 48  # a one-field object with a noun phrase is at most 30
 
-NO_WAY: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
+
+@dataclass(frozen=True)
+class Reasoned:
+    """What one mode made of a question: the program it was read into (None: it has none) and what that gives."""
+
+    program: Program | None
+    ranking: Ranking
+    grounder: Grounder
+    sure: bool
+    reader: str = ""  # "model" or "rules"
+    confidence: float | None = None  # of the model's reading, 0..1
+    kept: dict[str, Any] | None = None  # mode "deductive": what was kept of each level
 
 
 class Reasoner:
@@ -43,40 +60,95 @@ class Reasoner:
         self._model = model
         self._place_types = frozenset(map(normal_form, place_types))
         self._use_model = use_model
+        self._layout: tuple[SceneGraph, Layout] | None = None
+        self._modes: dict[str, Callable[[SceneGraph, Question], Reasoned]] = {
+            "program": self._by_model,
+            "rules": self._by_rules,
+            "deductive": self._by_levels,
+        }
 
     def answer(self, graph: SceneGraph, revision: int, question: Question) -> dict[str, Any]:
         """The fields of the answer, all but those of an error. Raises QueryError when the question is not usable."""
         _check(question)
         before = self._model.calls
-        by_model = question.mode == "model"
-        if by_model and not self._use_model:
-            raise QueryError("mode 'model' needs the language model, which use_model = false switches off")
-        program = self.parse(graph, question.text, by_model=by_model)
-        scope = narrow(graph, program, self._names)
-        if program.purpose:
-            program = self._by_purpose(program, scope)
-        grounder = Grounder(graph, self._names, np.asarray(question.viewpoint_world, float))
-        ranking = grounder.rank(program, scope)
-        if by_model:
-            ranking.notes.insert(0, "the language model read the question")
-            decided = choose(self._model, graph, ranking, question.text)
-        else:
-            # words that the program does not hold are all that could tell tied ones apart
-            reader = self._model if program.rest and self._use_model else None
-            decided = settle(reader, graph, ranking, question.text)
+        reasoned = self._modes[question.mode](graph, question)
+        return self._fields(graph, revision, question, reasoned, before)
+
+    def answer_program(self, graph: SceneGraph, revision: int, question: Question, program: Program) -> dict[str, Any]:
+        """The answer to a question whose program is given (an oracle's). Raises QueryError."""
+        before = self._model.calls
+        return self._fields(graph, revision, question, self._executed(graph, question, program, ""), before)
+
+    def _fields(
+        self, graph: SceneGraph, revision: int, question: Question, reasoned: Reasoned, calls: int
+    ) -> dict[str, Any]:
+        program, ranking = reasoned.program, reasoned.ranking
+        parse = reasoned.kept
+        if program:
+            parse = {
+                "text": write(program.target),
+                "program": program.model_dump(mode="json"),
+                "confidence": reasoned.confidence,
+                "reader": reasoned.reader,
+            }
         common = {
             "question": question.text,
             "question_id": question.question_id,
-            "parse": program.model_dump(mode="json"),
+            "parse": parse,
             "revision": revision,
-            "llm_calls": self._model.calls - before,
+            "llm_calls": self._model.calls - calls,
         }
         if not ranking.candidates:
-            return common | self._not_in_map(graph, program, ranking, grounder)
-        return common | _found(graph, ranking, grounder, question.k, decided)
+            target = program.target if program else Thing()
+            return common | not_in_map(graph, target, ranking, reasoned.grounder, self._names)
+        return common | found(graph, ranking, reasoned.grounder, question.k, reasoned.sure)
 
-    def parse(self, graph: SceneGraph, text: str, *, by_model: bool = False) -> Program:
-        """The program of a question in this map; by_model: wholly read by the language model. Raises QueryError."""
+    def _by_model(self, graph: SceneGraph, question: Question) -> Reasoned:
+        if not self._use_model:  # asked for by the configuration, and said in the parse
+            return self._by_rules(graph, question)
+        check_text(question.text)
+        read = read_request if self._model.adapter_path else read_by_examples
+        reading = read(self._model, question.text)
+        confidence = round(float(reading.confidence), 4)
+        if confidence < LEAST_CONFIDENCE:
+            reasoned = self._by_levels(graph, question)
+            reasoned.ranking.notes.insert(0, f"the reading of the request is doubtful (confidence {confidence:.2f})")
+            return reasoned
+        return self._executed(graph, question, Program(target=reading.thing), "model", confidence)
+
+    def _by_levels(self, graph: SceneGraph, question: Question) -> Reasoned:
+        if not self._use_model:
+            raise QueryError("mode 'deductive' needs the language model, which use_model = false switches off")
+        asker = np.asarray(question.viewpoint_world, float)
+        grounder = Grounder(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
+        kept, ranking = deduce(self._model, grounder, question.text)
+        return Reasoned(None, ranking, grounder, ranking.sure, "levels", kept=asdict(kept))
+
+    def _by_rules(self, graph: SceneGraph, question: Question) -> Reasoned:
+        return self._executed(graph, question, self.parse(graph, question.text), "rules")
+
+    def _executed(
+        self, graph: SceneGraph, question: Question, program: Program, reader: str, confidence: float | None = None
+    ) -> Reasoned:
+        """Run a program on the graph."""
+        asker = np.asarray(question.viewpoint_world, float)
+        grounder = Grounder(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
+        scope = grounder.scope(program.target)
+        if any(program.target.said("for")):
+            program = self._by_purpose(program, scope)
+        ranking = grounder.rank(program, scope)
+        # words that the program does not hold are all that could tell tied ones apart
+        reader_of_ties = self._model if program.rest and self._use_model else None
+        sure = settle(reader_of_ties, graph, ranking, question.text)
+        return Reasoned(program, ranking, grounder, sure, reader, confidence)
+
+    def _layout_of(self, graph: SceneGraph) -> Layout:
+        if self._layout is None or self._layout[0] is not graph:
+            self._layout = (graph, layout_of(graph))
+        return self._layout[1]
+
+    def parse(self, graph: SceneGraph, text: str) -> Program:
+        """The program of a question in this map, by rules. Raises QueryError."""
         objects = graph.layer("object")
         places = [*graph.layer("room"), *graph.layer("location")]
 
@@ -91,19 +163,17 @@ class Reasoner:
         def is_known(phrase: str) -> bool:
             return self._names.is_known(phrase, objects) or is_place(phrase)
 
-        if by_model:
-            return dictated(self._model, text, graph, is_place)
-        found = draft(text, is_place, is_known)
-        if len(found.target_options) < 2 or not self._use_model:
-            return found.program
-        fields = {"target": found.target_options}
+        drafted = draft(text, is_place, is_known)
+        if len(drafted.target_options) < 2 or not self._use_model:
+            return drafted.program
+        fields = {"target": drafted.target_options}
         said = " ".join(tokens(text))
         reply = self._model.complete(
-            prompt("target", question=said, things=", ".join(found.target_options)),
+            prompt("target", question=said, things=", ".join(drafted.target_options)),
             object_grammar(fields),
             CHOICE_TOKENS,
-        ).text
-        return found.by_target[read_choice(reply, fields)["target"]]
+        )
+        return drafted.by_target[read_choice(reply.text, fields)["target"]]
 
     @staticmethod
     def _is_tag(phrase: str, objects: Sequence[Node]) -> bool:
@@ -111,79 +181,24 @@ class Reasoner:
 
     def _by_purpose(self, program: Program, scope: Scope) -> Program:
         """Let the model choose which of the names in scope serves the purpose."""
+        purpose = next(program.target.said("for")).words
         names = sorted({normal_form(node.tags[0].name) for node in scope.objects if node.tags} - {""})
         scope.sure = False
         if not names or not self._use_model:
-            raise QueryError(f"the question names no thing that can be looked for: {program.purpose}")
+            raise QueryError(f"the question names no thing that can be looked for: {purpose}")
         if len(names) > MOST_OPTIONS:
-            near = self._names.nearest(program.purpose, scope.objects, MOST_OPTIONS)
+            near = self._names.nearest(purpose, scope.objects, MOST_OPTIONS)
             names = sorted({normal_form(name) for name in near})
         options = [f" {name}" for name in names]
-        opening, said = prompt("purpose", purpose=program.purpose).split("|", 1)
+        opening, said = prompt("purpose", purpose=purpose).split("|", 1)
         neutral = prompt("purpose", purpose="something").split("|", 1)[1]
         # minus what each name scores when nothing is said: common words would win otherwise
         prior = self._model.log_probabilities(opening, neutral, options)
         scores = self._model.log_probabilities(opening, said, options) - prior
         best = int(np.argmax(scores))
-        scope.notes.append(f"the language model chose {names[best]} among {len(names)} names for: {program.purpose}")
+        scope.notes.append(f"the language model chose {names[best]} among {len(names)} names for: {purpose}")
+        scope.thing = scope.thing.model_copy(update={"noun": names[best]})
         return program.model_copy(update={"target": program.target.model_copy(update={"noun": names[best]})})
-
-    def _not_in_map(self, graph: SceneGraph, program: Program, ranking: Ranking, grounder: Grounder) -> dict[str, Any]:
-        objects = graph.layer("object")
-        where = " there" if program.room or program.floor else " in the map"
-        missing = f"is called {program.target.noun}" if program.target.noun else "fits the question"
-        evidence = [*ranking.notes, f"nothing{where} {missing}"]
-        elsewhere = self._names.named(program.target.noun, objects) if program.target.noun else []
-        if elsewhere:
-            listed = [f"{fit.node.name} {fit.node.id} in {_place(graph, fit.node)}" for fit in elsewhere[:5]]
-            evidence.append(f"elsewhere: {'; '.join(listed)}")
-        else:
-            nearest = self._names.nearest(program.target.noun, objects)
-            evidence.append(f"the nearest names in the map: {', '.join(nearest) or 'none'}")
-        view = grounder.viewpoint(graph.building)
-        return {
-            "status": "not_in_map",
-            "object_id": None,
-            "name": None,
-            "box": None,
-            "center": None,
-            "path": [],
-            "evidence": evidence,
-            "candidates": [],
-            "sure": ranking.sure and not elsewhere,
-            **NO_WAY,
-            "viewpoint": {"source": view.source, "xyz": _numbers(view.xyz_world)},
-        }
-
-
-def error_answer(question: Question, revision: int, reason: str) -> dict[str, Any]:
-    """The fields of an answer that says why there is none."""
-    asker = question.viewpoint_world
-    given = bool(np.isfinite(asker).all())
-    return {
-        "status": "error",
-        "error": reason,
-        "question": question.text,
-        "question_id": question.question_id,
-        "object_id": None,
-        "name": None,
-        "box": None,
-        "center": None,
-        "path": [],
-        "evidence": [],
-        "candidates": [],
-        "sure": False,
-        **NO_WAY,
-        "viewpoint": {"source": "asker", "xyz": _numbers(asker)} if given else None,
-        "parse": None,
-        "revision": revision,
-        "llm_calls": 0,
-    }
-
-
-def to_json(fields: dict[str, Any]) -> str:
-    """Canonical JSON: sorted keys, no spaces; equal answers give equal bytes."""
-    return json.dumps(fields, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def _check(question: Question) -> None:
@@ -194,56 +209,3 @@ def _check(question: Question) -> None:
     finite = np.isfinite(question.viewpoint_world)
     if finite.any() and not finite.all():
         raise QueryError(f"viewpoint {question.viewpoint_world.tolist()}: give all of x, y and z, or none (NaN)")
-
-
-def _found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure: bool) -> dict[str, Any]:
-    best = ranking.candidates[0]
-    view = grounder.viewpoint(best.node)
-    return {
-        "status": "found",
-        "object_id": best.node.id,
-        "name": best.node.name,
-        "box": _numbers(best.node.box),
-        "center": _numbers(best.node.center),
-        "path": [{"id": step.id, "layer": step.layer, "name": step.name} for step in graph.path(best.node.id)],
-        "evidence": [*ranking.notes, *best.evidence],
-        "candidates": [_candidate(candidate) for candidate in ranking.candidates[:k]],
-        "sure": sure,
-        **_way_to(graph, best.node, grounder.asker_world),
-        "viewpoint": {"source": view.source, "xyz": _numbers(view.xyz_world)},
-    }
-
-
-def _way_to(graph: SceneGraph, node: Node, asker_world: NDArray[np.float64]) -> dict[str, Any]:
-    """Where to stand before a node, and how the asker gets there: rooms and connections in turn, metres.
-
-    To an object that cannot be approached the way into its room, as far as its middle; 0 m for who is there already.
-    """
-    approach = approach_to_dict(node.approach)
-    found = NO_WAY | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
-    if not np.isfinite(asker_world).all():
-        return found
-    room = graph.room_of(node.id)
-    route = find_route(graph, asker_world, node.id) or (find_route(graph, asker_world, room) if room else None)
-    if route is None:
-        return found
-    return found | {"route": list(route.ids), "travel_m": _numbers(route.length_m)}
-
-
-def _candidate(candidate: Candidate) -> dict[str, Any]:
-    return {
-        "id": candidate.node.id,
-        "name": candidate.node.name,
-        "score": round(candidate.score, 4),
-        "evidence": candidate.evidence,
-    }
-
-
-def _numbers(values: Any) -> Any:
-    # adding 0.0 turns -0.0 into 0.0, so that equal answers print alike
-    return (np.round(np.asarray(values, float), 3) + 0.0).tolist()
-
-
-def _place(graph: SceneGraph, node: Node) -> str:
-    parent = graph.nodes[node.parent]
-    return f"{parent.name} {parent.id}"

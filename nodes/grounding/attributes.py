@@ -1,13 +1,22 @@
-"""Colour and size words, and how well an object fits them."""
+"""How things look: colour, size and other words, and how well each of several things fits them.
+
+Source: METHOD section 10 ("attributes"). Departs: sizes are ranks among things of the same name; words that are neither
+colours nor sizes are looked for in the tags, and decide nothing where no tag holds them.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from placegraph.nodes.grounding.boxes import F64, Boxes
+from placegraph.nodes.grounding.relations.extent import bulk, length_m
+from placegraph.nodes.grounding.words import tokens
 from placegraph.runtime.scene_graph import Node
 
 # sRGB of the eleven basic colour terms (Berlin and Kay) and beige, as in CSS but for brown, green and pink,
@@ -18,38 +27,126 @@ BASIC_COLORS: dict[str, tuple[int, int, int]] = {
     "brown": (115, 75, 40), "pink": (235, 150, 175), "purple": (120, 50, 140), "beige": (220, 205, 170),
 }  # fmt: skip
 COLORS = {name: name for name in BASIC_COLORS} | {
-    "grey": "gray",
-    "violet": "purple",
-    "golden": "yellow",
-    "tan": "beige",
-}
-SIZES = {"big": "large", "large": "large", "huge": "large", "small": "small", "little": "small", "tiny": "small"}
+    "grey": "gray", "silver": "gray", "violet": "purple", "lilac": "purple", "golden": "yellow", "gold": "yellow",
+    "tan": "beige", "cream": "beige", "navy": "blue", "turquoise": "blue", "teal": "green", "maroon": "red",
+    "burgundy": "red", "crimson": "red", "olive": "green", "lime": "green", "magenta": "pink", "rose": "pink",
+    "khaki": "beige", "ivory": "white", "charcoal": "gray", "chestnut": "brown",
+}  # fmt: skip
+SIZES = {
+    "big": "large", "large": "large", "huge": "large", "giant": "large", "massive": "large", "small": "small",
+    "little": "small", "tiny": "small", "mini": "small", "tall": "tall", "high": "tall", "short": "short",
+    "low": "short", "long": "long", "wide": "long", "narrow": "narrow", "slim": "narrow", "thin": "narrow",
+}  # fmt: skip
+SHADES = {"dark": -1.0, "darker": -1.0, "deep": -1.0, "light": 1.0, "lighter": 1.0, "pale": 1.0, "bright": 0.0}
+SAID_BESIDE = frozenset(("color", "colour", "colored", "coloured", "in", "with", "a", "very", "mostly", "kind", "of"))
 COLOR_FALLOFF = 30.0  # departs: CIELAB distance at which a colour's fit falls to 1/e; a median under room light is dull
+SHADE_L = 20.0  # departs: CIELAB lightness between brown and dark brown
 UNKNOWN_FIT = 0.5  # an object whose colour was not seen neither fits nor fails
+FITS = 0.6  # departs: colour fit from which on an object is called by that colour; below it does not hold
+SIZE_LEAST = 0.4  # departs: the smallest of several is still called large by someone
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How well n things fit the words: values (n,), whether the map knows, and a sentence for each."""
+
+    values: F64
+    known: bool
+    sentences: tuple[str, ...]
+
+
+def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: NDArray[np.bool_]) -> Look:
+    """How well each of n nodes fits the words of an `is`; among (n,): those with whom sizes are compared."""
+    said = [word for word in tokens(words.replace("-", " ")) if word not in SAID_BESIDE]
+    values, known = np.ones(len(nodes)), []
+    notes: list[list[str]] = [[] for _ in nodes]
+    color = next((COLORS[stem] for word in said if (stem := _stem(word)) in COLORS), "")
+    shade = next((SHADES[word] for word in said if word in SHADES), 0.0)
+    if color or (shade and len(said) == 1):
+        fits, told = _colors(nodes, color, shade, said)
+        values *= fits
+        known.append(told)
+        for i, node in enumerate(nodes):
+            seen = f"sRGB {node.color}" if node.color else "a colour that was not seen"
+            notes[i].append(f"{boxes.labels[i]} has {seen}: {words} fits {fits[i]:.2f}")
+    for word in said:
+        if _stem(word) in COLORS or word in SHADES:
+            continue
+        tagged = np.array([_is_tagged(node, word) for node in nodes], bool)
+        if tagged.any():
+            values *= np.where(tagged, 1.0, 0.1)
+            known.append(True)
+            for i in np.flatnonzero(tagged).tolist():
+                notes[i].append(f"{boxes.labels[i]} is tagged {word}")
+        elif word in SIZES:
+            fits = size_fit(boxes, SIZES[word], among)
+            values *= fits
+            known.append(True)
+            for i in range(len(nodes)):
+                notes[i].append(f"{boxes.labels[i]} among {int(among.sum())}: {word} fits {fits[i]:.2f}")
+        else:
+            known.append(False)
+    return Look(values, bool(known) and all(known), tuple("; ".join(note) for note in notes))
+
+
+def _stem(word: str) -> str:
+    """The colour in greenish, reddish, whitish."""
+    if not word.endswith("ish"):
+        return word
+    stem = word[:-3]
+    return next((one for one in (stem, stem + "e", re.sub(r"(.)\1$", r"\1", stem)) if one in COLORS), word)
+
+
+def _is_tagged(node: Node, word: str) -> bool:
+    return any(word in tokens(tag.name) for tag in node.tags)
+
+
+def _colors(nodes: Sequence[Node], color: str, shade: float, said: Sequence[str]) -> tuple[F64, bool]:
+    tagged = np.array([any(_is_tagged(node, word) for word in said if _stem(word) in COLORS) for node in nodes], bool)
+    seen = np.array([len(node.color) == 3 for node in nodes], bool)
+    fits = np.full(len(nodes), UNKNOWN_FIT)
+    if seen.any():
+        lab = _lab([node.color for node in nodes if len(node.color) == 3])
+        fits[seen] = _color_fits(lab, color, shade) if color else np.clip(0.5 + shade * (lab[:, 0] - 50) / 60, 0, 1)
+    # below the limit it does not hold (a half is the limit of all that holds)
+    fits = np.where(seen & (fits < FITS), fits * 0.5 / FITS, fits)
+    if tagged.any():
+        fits = np.where(tagged, 1.0, np.where(seen, fits, 0.3))
+    return fits, bool(seen.any() or tagged.any())
+
+
+def _color_fits(lab: F64, color: str, shade: float) -> F64:
+    """(n,) 1 where a colour is the nearest of the basic terms; dark and light ones have their own shade."""
+    names = list(BASIC_COLORS)
+    terms = _lab(list(BASIC_COLORS.values()))
+    if shade:
+        terms[names.index(color), 0] = np.clip(terms[names.index(color), 0] + shade * SHADE_L, 5, 95)
+    distances = np.linalg.norm(lab[:, None] - terms[None], axis=2)
+    excess = distances[:, names.index(color)] - distances.min(axis=1)
+    return np.asarray(np.exp(-excess / COLOR_FALLOFF))
 
 
 def color_fit(node: Node, color: str) -> float:
     """How well an object's median colour is called `color`, 0..1: 1 when that is the nearest of the basic terms."""
-    if color in {word for tag in node.tags for word in tag.name.lower().split()}:
-        return 1.0
-    if len(node.color) != 3:
-        return UNKNOWN_FIT
-    seen = _lab([node.color])[0]
-    names = list(BASIC_COLORS)
-    distances = np.linalg.norm(_lab(list(BASIC_COLORS.values())) - seen, axis=1)
-    excess = float(distances[names.index(color)] - distances.min())
-    return float(np.exp(-excess / COLOR_FALLOFF))
+    return float(_colors([node], color, 0.0, [color])[0][0])
 
 
-def size_fit(nodes: Sequence[Node], size: str) -> list[float]:
-    """How well each of the nodes is called large or small among them, 0..1: its rank by volume."""
-    if len(nodes) < 2:
-        return [1.0] * len(nodes)
-    volumes = [float(np.prod(np.maximum(np.ptp(node.box, axis=0), 0.01))) for node in nodes]
-    below = [sum(other < volume for other in volumes) / (len(volumes) - 1) for volume in volumes]
-    return [0.5 + 0.5 * (share if size == "large" else 1 - share) for share in below]
+def size_fit(boxes: Boxes, size: str, among: NDArray[np.bool_]) -> F64:
+    """(n,) how well each is called large, small, tall, short, long or narrow among the others: by its rank."""
+    if size in ("large", "small"):
+        values = bulk(boxes)
+    elif size in ("tall", "short"):
+        values = boxes.size[:, 2]
+    else:
+        values = length_m(boxes)
+    peers = values[among]
+    if len(peers) < 2:
+        return np.ones(len(boxes))
+    below = (peers[None] < values[:, None] - 1e-6).sum(axis=1) / (len(peers) - 1)
+    share = np.clip(below, 0, 1) if size in ("large", "tall", "long") else np.clip(1 - below, 0, 1)
+    return np.asarray(SIZE_LEAST + (1 - SIZE_LEAST) * share)
 
 
-def _lab(colors: Sequence[tuple[int, ...]]) -> NDArray[np.float64]:
+def _lab(colors: Sequence[tuple[int, ...]]) -> F64:
     pixels = np.asarray(colors, np.float32).reshape(1, -1, 3) / 255
     return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2Lab)[0], np.float64)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from placegraph.nodes.grounding.ground import Candidate, Ranking
 from placegraph.nodes.grounding.llm import LanguageModel, prompt
 from placegraph.nodes.grounding.program import enum_rule
+from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.nodes.grounding.textualise import small_graph
 from placegraph.nodes.grounding.words import tokens
 from placegraph.runtime.errors import QueryError
@@ -35,34 +35,6 @@ def settle(model: LanguageModel | None, graph: SceneGraph, ranking: Ranking, tex
         chosen = _put_first(ranking, tied, reply)
         ranking.notes.append(f"the language model chose {_id(chosen)}")
     return False
-
-
-def choose(model: LanguageModel, graph: SceneGraph, ranking: Ranking, text: str) -> bool:
-    """Put the candidate that the model chooses first; returns whether the evidence chose it too, and it alone.
-
-    As many of the best candidates are shown as fit the context. Raises QueryError when not even two do.
-    """
-    if len(ranking.candidates) < 2:
-        return ranking.sure
-    best, tied, count = ranking.candidates[0], ranking.tied(), len(ranking.candidates)
-    shown = ranking.candidates[:MOST_SHOWN]
-    opening, asked = _question(graph, shown, text)
-    while len(shown) > 2 and not model.fits(opening, asked, ID_TOKENS):
-        shown = shown[:-1]
-        opening, asked = _question(graph, shown, text)
-    reply = model.complete(asked, f'root ::= " " ({enum_rule(list(map(_id, shown)))})', ID_TOKENS, opening=opening).text
-    chosen = _put_first(ranking, shown, reply.strip())
-    of = f", the best of {count}" if len(shown) < count else ""
-    against = "" if chosen is best else f"; by the evidence alone it would be {_id(best)}"
-    ranking.notes.append(f"the language model chose {_id(chosen)} among {_ids(shown)}{of}{against}")
-    return ranking.sure and chosen is best and len(tied) == 1
-
-
-def _question(graph: SceneGraph, shown: Sequence[Candidate], text: str) -> tuple[str, str]:
-    """The examples, and what is asked after them."""
-    objects = small_graph(graph, shown)
-    opening, asked = prompt("ground", objects=objects, question=" ".join(tokens(text))).split("|", 1)
-    return opening, asked
 
 
 def _put_first(ranking: Ranking, offered: Sequence[Candidate], reply: str) -> Candidate:

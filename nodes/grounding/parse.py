@@ -10,13 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from placegraph.nodes.grounding.phrases import WHOLE_MAP, Piece, cut
-from placegraph.nodes.grounding.program import Clause, Program, Thing
-from placegraph.nodes.grounding.relations import families
+from placegraph.nodes.grounding.schema import ANYTHING, CONDITIONS, MOST_DEPTH, Condition, Program, Thing
 from placegraph.nodes.grounding.words import normal_form, tokens
 from placegraph.runtime.errors import QueryError
 
 MOST_CHARS = 500  # departs: a spoken request is far shorter; longer text is no question and would not fit the model
-MOST_CLAUSES = 4
+MOST_CLAUSES = 4  # departs: relations of one request; people say no more in one breath
+ON_SPOT = ("corner", "center")  # said of the room, or "of" a thing
 PURPOSE_STARTS = (
     "where can i", "where could i", "where do i", "where should i", "where may i", "where can we", "where do you",
     "something to", "somewhere to", "something for", "place to", "something i can", "anything to", "i want to",
@@ -34,10 +34,21 @@ class Draft:
     by_target: dict[str, Program] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class _Clause:
+    """One relation as it is said; `of` 0: of the target, i: of the anchor of clause i."""
+
+    relation: str
+    anchors: tuple[Piece, ...] = ()
+    of: int = 0
+    ordinal: int = 1
+    negated: bool = False
+
+
 @dataclass
 class _Build:
     target: Piece | None = None
-    clauses: list[Clause] = field(default_factory=list)
+    clauses: list[_Clause] = field(default_factory=list)
     room: str = ""
     outside: bool = False
     floor: str = ""
@@ -68,7 +79,9 @@ def draft(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], 
     known = tuple(option for option in options if is_known(option))
     if purpose and not known:
         program = _assemble(pieces, None, is_place)
-        return Draft(program.model_copy(update={"purpose": purpose, "target": Thing(), "clauses": ()}))
+        places = tuple(one for one in program.target.conditions if one.kind == "place")
+        use = Condition(name="for", words=purpose)
+        return Draft(program.model_copy(update={"target": Thing(noun=ANYTHING, conditions=(use, *places))}))
     options = known or options
     by_noun = {option: next(piece for piece in leads if piece.text == option) for option in options}
     if len(options) > 1:
@@ -76,7 +89,7 @@ def draft(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], 
         return Draft(programs[options[-1]], options, programs)
     chosen = by_noun[options[0]] if options else (leads[0] if leads else None)
     program = _assemble(pieces, chosen, is_place)
-    if chosen is None and not (program.clauses or program.room or program.floor):
+    if chosen is None and not program.target.conditions:
         raise QueryError("the question names nothing to look for")
     return Draft(program)
 
@@ -116,7 +129,9 @@ def _split_place(piece: Piece, is_place: Callable[[str], bool], is_known: Callab
 
 
 def _takes(piece: Piece) -> tuple[int, int]:
-    return families()[piece.text].anchors[piece.text]
+    if piece.text in ON_SPOT:
+        return (1, 1) if piece.words[-1:] == ["of"] else (0, 0)
+    return CONDITIONS[piece.text].things
 
 
 def _leading_things(pieces: list[Piece]) -> list[Piece]:
@@ -169,21 +184,32 @@ def _assemble(pieces: list[Piece], target: Piece | None, is_place: Callable[[str
         elif piece.kind == "thing" and piece is not target:
             build.rest += [word for word in piece.words if word not in build.rest]
     if ordinal > 1:
-        build.clauses.append(Clause(relation="leftmost", ordinal=ordinal))  # "the second chair": counted from the left
-    thing = Thing() if target is None else _thing(target)
-    clauses = tuple(build.clauses[:MOST_CLAUSES])
-    return Program(
-        target=thing,
-        clauses=clauses,
-        room=build.room,
-        outside=build.outside,
-        floor=build.floor,
-        rest=tuple(build.rest),
-    )
+        build.clauses.append(_Clause("nth", ordinal=ordinal))  # "the second chair"
+    thing = _thing(target, build.clauses, 0, 1)
+    places = []
+    if build.room:
+        places.append(Condition(name="room", things=(Thing(noun=build.room),), negated=build.outside))
+    if build.floor:
+        places.append(Condition(name="floor", words=build.floor))
+    thing = thing.model_copy(update={"conditions": (*thing.conditions, *places)})
+    return Program(target=thing, rest=tuple(build.rest))
 
 
-def _thing(piece: Piece) -> Thing:
-    return Thing(noun=piece.text, color=piece.color, size=piece.size, plural=piece.plural)
+def _thing(piece: Piece | None, clauses: list[_Clause], index: int, depth: int) -> Thing:
+    """A piece with its looks and the clauses said of it: those of the target (index 0) or of a clause's anchor."""
+    looks = [] if piece is None else [Condition(name="is", words=word) for word in (piece.size, piece.color) if word]
+    relations = []
+    for i, clause in enumerate(clauses[:MOST_CLAUSES], 1):
+        if clause.of != index or (clause.anchors and depth == MOST_DEPTH):
+            continue
+        things = tuple(
+            _thing(anchor, clauses if k == 0 else [], i, depth + 1) for k, anchor in enumerate(clause.anchors)
+        )
+        counts = CONDITIONS[clause.relation].number
+        number = clause.ordinal if counts == "must" or (counts == "may" and clause.ordinal > 1) else 0
+        relations.append(Condition(name=clause.relation, things=things, number=number, negated=clause.negated))
+    noun = piece.text if piece is not None and piece.text else ANYTHING
+    return Thing(noun=noun, conditions=(*looks, *relations))
 
 
 def _add_clause(
@@ -201,20 +227,18 @@ def _add_clause(
             del pieces[i + 1 : i + 3]
     else:
         anchors, after = _anchors(build, pieces, i, most)
-    if len(anchors) == 1 and relation.text in ("inside", "near") and anchors[0].text in WHOLE_MAP:
+    if len(anchors) == 1 and relation.text in ("in", "near") and anchors[0].text in WHOLE_MAP:
         return after
-    if len(anchors) == 1 and relation.text in ("inside", "on", "near") and is_place(anchors[0].text):
+    if len(anchors) == 1 and relation.text in ("in", "on", "near") and is_place(anchors[0].text):
         build.room, build.outside = build.room or anchors[0].text, negated
         return after
-    if len(anchors) < least and not (most == 2 and len(anchors) == 1):
+    if len(anchors) < least and relation.text not in ON_SPOT:
         return after  # a preposition that leads nowhere: "something to sit on", "over there"
     # without "and" or a comma, a relation belongs to the noun before it: the last anchor
     of = 0 if joined or not build.clauses or not build.clauses[-1].anchors else len(build.clauses)
     if ordinal == 1 and most == 0 and not joined:
         of = 0
-    build.clauses.append(
-        Clause(relation=relation.text, anchors=tuple(map(_thing, anchors)), of=of, ordinal=ordinal, negated=negated)
-    )
+    build.clauses.append(_Clause(relation.text, tuple(anchors), of, ordinal, negated))
     return after
 
 

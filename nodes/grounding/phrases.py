@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from placegraph.nodes.grounding.attributes import COLORS, SIZES
+from placegraph.nodes.grounding.attributes import COLORS
 from placegraph.nodes.grounding.relations import triggers
 from placegraph.nodes.grounding.words import is_plural, normal_form, singular, tokens, words_of
 
@@ -40,19 +40,23 @@ FLOOR_KINDS = frozenset(("ground", "top", "upper", "lower", "lowest", "highest",
     ORDINALS
 )
 BREAKS = frozenset(",.;:?!")
+SIDES = {"left": "leftmost", "right": "rightmost", "middle": "middle"}
 IDIOMS = ("i left", "we left", "you left", "left my", "have left", "on it", "at home", "over there", "in here",
           "turn on", "turned on", "which room", "what room", "which floor", "what floor", "take a look at", "look at",
           "what color", "next time", "is left", "in order", "so that", "by the way", "go to")  # fmt: skip
 
+# Only these are taken off a noun: a "low table" and a "high chair" are things of their own.
+SIZES = {"big": "large", "large": "large", "huge": "large", "small": "small", "little": "small", "tiny": "small"}
+
 OWNS = r"\b(?:that |which )?(?:has|have|with|holds|holding|carries|carrying) (.{1,60}?) "
 TURNED = (
-    (re.compile(OWNS + r"(?:on|on top of) it\b", re.IGNORECASE), r"under \1"),
-    (re.compile(OWNS + r"on top\b(?! of)", re.IGNORECASE), r"under \1"),
+    (re.compile(OWNS + r"(?:on|on top of) it\b", re.IGNORECASE), r"holding \1"),
+    (re.compile(OWNS + r"on top\b(?! of)", re.IGNORECASE), r"holding \1"),
     (re.compile(OWNS + r"(?:next to|near|beside|by) it\b", re.IGNORECASE), r"near \1"),
-    (re.compile(OWNS + r"(?:above|over) it\b", re.IGNORECASE), r"below \1"),
+    (re.compile(OWNS + r"(?:above|over) it\b", re.IGNORECASE), r"under \1"),
     (re.compile(OWNS + r"(?:under|below|underneath) it\b", re.IGNORECASE), r"above \1"),
-    (re.compile(r"\bwithout (.{1,60}?)(?: on it| on top)?(?=[,.?!]|$)", re.IGNORECASE), r"not under \1"),
-    (re.compile(OWNS + r"(?:in|inside) it\b", re.IGNORECASE), r"around \1"),
+    (re.compile(r"\bwithout (.{1,60}?)(?: on it| on top)?(?=[,.?!]|$)", re.IGNORECASE), r"not holding \1"),
+    (re.compile(OWNS + r"(?:in|inside) it\b", re.IGNORECASE), r"holding \1"),
 )
 
 
@@ -102,7 +106,7 @@ def cut(text: str) -> list[Piece]:
             i += floor[0]
         elif size:
             flush()
-            pieces.append(Piece("relation", phrases[words[i : i + size]]))
+            pieces.append(Piece("relation", phrases[words[i : i + size]], words=list(words[i : i + size])))
             i += size
         else:
             i += 1
@@ -123,9 +127,9 @@ def _single(word: str, following: str, pending: list[str], pieces: list[Piece], 
     elif word in ORDINALS:
         flush()
         pieces.append(Piece("ordinal", number=ORDINALS[word]))
-    elif word in ("left", "right") and following and following not in FILLER and following not in BREAKS:
+    elif word in SIDES and following and following not in FILLER and following not in BREAKS:
         flush()
-        pieces.append(Piece("relation", f"{word}most"))  # "the left chair"
+        pieces.append(Piece("relation", SIDES[word]))  # "the left chair", "the middle one"
     elif word in ("to", "from") and not pending:
         pieces.append(Piece("to"))
     elif word in ("to", "from"):

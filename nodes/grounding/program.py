@@ -1,6 +1,6 @@
-"""The typed query a question is parsed into, and the grammar that constrains what is left open in it.
+"""Grammars that hold the language model to options that exist, and what is read from its replies.
 
-Source: METHOD section 10, step 1 (target, anchors, relations, ordinals, attributes, room, floor).
+Source: METHOD section 10 ("every call is constrained by a grammar whose ids are an enum").
 """
 
 from __future__ import annotations
@@ -14,41 +14,6 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from placegraph.runtime.errors import QueryError
 
 SAFE = re.compile(r"[a-zA-Z0-9][a-zA-Z0-9 '-]*")  # all that may enter a grammar: a malformed one kills the process
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
-
-
-class Thing(_Part):
-    """A noun phrase: what to look for. An empty noun stands for anything."""
-
-    noun: str = ""
-    color: str = ""
-    size: str = ""  # "large" or "small"
-    plural: bool = False
-
-
-class Clause(_Part):
-    """One condition: a thing stands in `relation` to the anchors; `of` 0: the target, i: anchor of clause i."""
-
-    relation: str
-    anchors: tuple[Thing, ...] = ()
-    of: int = 0
-    ordinal: int = 1
-    negated: bool = False
-
-
-class Program(_Part):
-    """A question as conditions on one target."""
-
-    target: Thing
-    clauses: tuple[Clause, ...] = ()
-    room: str = ""  # a room or location by its words or id
-    outside: bool = False  # everywhere but in that room
-    floor: str = ""  # "upstairs", "second floor", "floor 1", "F2", ...
-    purpose: str = ""  # what the thing is for, where the question names no thing ("something to sit on")
-    rest: tuple[str, ...] = ()  # content words that found no place in the program
 
 
 def enum_rule(options: Sequence[str]) -> str:
@@ -83,5 +48,7 @@ def read_choice(reply: str, fields: Mapping[str, Sequence[str]]) -> dict[str, st
     return choice
 
 
-class _Choice(_Part):
+class _Choice(BaseModel):
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
     fields: dict[str, str]

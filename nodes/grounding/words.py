@@ -72,10 +72,33 @@ def _lines(file: str) -> list[str]:
 
 @cache
 def synonyms() -> dict[str, frozenset[str]]:
-    """Names of the same kind of thing, by normal form; read from synonyms.txt (one set a line, separated by commas)."""
+    """Names of the same kind of thing, by normal form, with and without the spaces of compounds.
+
+    Read from synonyms.txt: one set a line, separated by commas.
+    """
     found: dict[str, frozenset[str]] = {}
     for line in _lines("synonyms.txt"):
-        group = frozenset(normal_form(name) for name in line.split(","))
+        if ":" in line:
+            continue
+        group = frozenset(form for name in line.split(",") for form in _forms(name))
         for name in group:
             found[name] = found.get(name, frozenset()) | group
     return found
+
+
+@cache
+def kinds() -> dict[str, frozenset[str]]:
+    """What a wider word may stand for, by normal form; the lines `wider: one, other` of synonyms.txt."""
+    found: dict[str, frozenset[str]] = {}
+    for line in _lines("synonyms.txt"):
+        if ":" in line:
+            wider, members = line.split(":")
+            group = frozenset(form for name in members.split(",") for form in _forms(name))
+            for name in _forms(wider):
+                found[name] = found.get(name, frozenset()) | group
+    return found
+
+
+def _forms(name: str) -> tuple[str, str]:
+    whole = normal_form(name)
+    return whole, whole.replace(" ", "")

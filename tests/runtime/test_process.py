@@ -76,7 +76,7 @@ def test_a_question_that_nobody_waits_for_any_more_is_not_stepped(tmp_path: Path
     parcel = shell.inbox.get(1.0)
     assert parcel is not None
     if not in_time:
-        shell._desk._waiting[parcel.sequence][1].join()
+        shell._desk._waiting[parcel.sequence].timer.join()
         assert asker.replied
     shell._take(parcel)
     assert node.stepped == int(in_time)

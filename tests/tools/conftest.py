@@ -41,7 +41,6 @@ model = "drawn_scene"
 
 [nodes.grounding]
 name_places = false
-use_model = false
 
 [nodes.recorder]
 """

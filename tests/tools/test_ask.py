@@ -4,11 +4,14 @@ import shutil
 
 import pytest
 
+from placegraph.runtime.reply import Reply
 from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.tools.answerer import Answerer
 
+POSE = "pose: expected x,y,z or x,y,z,yaw in metres and degrees, world frame"
 KEYS = {
     "status", "question_id", "question", "object_id", "name", "box", "center", "path", "evidence", "candidates", "sure",
-    "parse", "viewpoint", "revision", "llm_calls", "ms", "approach", "route", "travel_m",
+    "parse", "viewpoint", "revision", "llm_calls", "ms", "approach", "route", "travel_m", "error",
 }  # fmt: skip
 
 
@@ -16,7 +19,7 @@ def test_found_as_json(cli, mapped) -> None:
     done = cli("ask", mapped, "the refrigerator", "--json")
     assert (done.code, done.err) == (0, "") and done.out.count("\n") == 1
     reply = json.loads(done.out)
-    assert set(reply) >= KEYS and reply["status"] == "found"
+    assert set(reply) == KEYS == set(Reply.model_validate(reply).model_dump()) and reply["status"] == "found"
     graph = SceneGraph.load(mapped / "graph.json")
     node = graph.nodes[reply["object_id"]]
     assert node.tags[0].name == reply["name"] == "refrigerator"
@@ -32,7 +35,7 @@ def test_found_in_words(cli, mapped) -> None:
     assert lines[0].startswith(f"{reply['object_id']}  chair") and lines[1].startswith("where: building (B0) > ")
     assert lines[2] == f"box:   {reply['box'][0]} to {reply['box'][1]} m"
     assert lines[-1].startswith(f"candidates: {reply['object_id']} chair ")
-    from_here = cli("ask", mapped, "a chair", "--viewpoint", "1,1,1.4").out.splitlines()
+    from_here = cli("ask", mapped, "a chair", "--pose", "1,1,1.4").out.splitlines()
     assert sum(line.startswith("way:   R") and line.endswith(" m") for line in from_here) == 1
     assert not any(line.startswith("way:") for line in lines)
 
@@ -52,7 +55,7 @@ def test_not_in_the_map_is_3(cli, mapped) -> None:
 
 def test_a_viewpoint_decides_what_is_left(cli, mapped) -> None:
     replies = [
-        json.loads(cli("ask", mapped, "the chair to the left of the table", "--viewpoint", at, "--json").out)
+        json.loads(cli("ask", mapped, "the chair to the left of the table", "--pose", at, "--json").out)
         for at in ("0.2,1.6,1.5", "6,1.6,1.5")
     ]
     assert replies[0]["object_id"] != replies[1]["object_id"]
@@ -72,21 +75,77 @@ def test_a_graph_file_alone_is_enough(cli, mapped, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (("",), "text: expected words that are not empty"),
-        ((" \n\t",), "text: expected words that are not empty"),
-        (("chair" * 101,), "text: at most 500 characters, got 505"),
-        (("chair", "--viewpoint", "1,2"), "viewpoint: expected x,y,z in metres, world frame, got '1,2'"),
-        (("chair", "--viewpoint", "1,2,3,4"), "viewpoint: expected x,y,z in metres, world frame, got '1,2,3,4'"),
-        (("chair", "--viewpoint", "a,b,c"), "viewpoint: expected x,y,z in metres, world frame, got 'a,b,c'"),
-        (("chair", "--viewpoint", f"1,2,{math.nan}"), "viewpoint: expected [x, y, z] in metres, world frame"),
-        (("chair", "--k", "0"), "k: expected a whole number from 1 to 50"),
-        (("chair", "--k", "51"), "k: expected a whole number from 1 to 50"),
+        (("",), "text: expected words, not empty, at most 500 characters, got ''"),
+        ((" \n\t",), "text: expected words, not empty, at most 500 characters, got ' \\n\\t'"),
+        (("chair" * 101,), "text: expected words, not empty, at most 500 characters, got 505"),
+        (("chair", "--pose", "1,2"), f"{POSE}, got '1,2'"),
+        (("chair", "--pose", "1,2,3,4,5"), f"{POSE}, got '1,2,3,4,5'"),
+        (("chair", "--pose", "a,b,c"), f"{POSE}, got 'a,b,c'"),
+        (
+            ("chair", "--pose", "1,2,nan"),
+            "pose: expected [x, y, z] or [x, y, z, yaw]: metres and radians, world frame, finite, got nan",
+        ),
+        (("chair", "--k", "0"), "k: expected a whole number from 1 to 50, got 0"),
+        (("chair", "--k", "51"), "k: expected a whole number from 1 to 50, got 51"),
+        (("chair", "--mode", "model"), "mode: expected one of program, rules, deductive, got 'model'"),
     ],
 )
 @pytest.mark.parametrize("where", ["map", "live"])
 def test_a_question_that_no_map_can_answer(cli, mapped, where, arguments, reason) -> None:
     done = cli("ask", mapped if where == "map" else "live", *arguments)
     assert (done.code, done.out, done.reason) == (1, "", reason)
+
+
+def test_a_pose_has_a_heading_in_degrees(cli, mapped, monkeypatch) -> None:
+    asked = []
+    ask = Answerer.ask
+    monkeypatch.setattr(
+        Answerer, "ask", lambda self, path, question: asked.append(question) or ask(self, path, question)
+    )
+    assert cli("ask", mapped, "a chair", "--pose", "1,2,1.5,-90").code == 0
+    assert asked[0].viewpoint_world.tolist() == [1, 2, 1.5] and asked[0].heading_rad == -math.pi / 2
+
+
+def test_an_object_list_is_asked_like_a_map(cli, tmp_path) -> None:
+    chair = {"id": "my chair", "tags": ["chair"], "center": [0, 0, 0], "size": [1, 1, 1]}
+    (tmp_path / "list.json").write_text(json.dumps({"objects": [chair]}))
+    done = cli("ask", tmp_path / "list.json", "the chair")
+    assert done.code == 0 and done.out.startswith("my chair  chair\n")
+
+
+def test_a_batch(cli, mapped, tmp_path) -> None:
+    questions, out = tmp_path / "q.jsonl", tmp_path / "a.jsonl"
+    questions.write_text('{"id": 1, "text": "the refrigerator"}\n{"id": 2, "text": "the piano"}\n{"id": 3}\n')
+    done = cli("ask", "--graph", mapped, "--batch", questions, "--out", out, "--mode", "rules", "--k", 1)
+    assert (done.code, done.err) == (0, "")
+    assert done.out.startswith("3 questions: 1 found, 1 not in the map, 1 errors; ")
+    answers = [json.loads(line) for line in out.read_text().splitlines()]
+    assert [answer["question_id"] for answer in answers] == [1, 2, 3]
+    single = json.loads(cli("ask", mapped, "the refrigerator", "--json", "--mode", "rules").out)
+    assert (answers[0]["object_id"], answers[0]["evidence"]) == (single["object_id"], single["evidence"])
+    assert answers[2]["error"].startswith("line 3: text: expected words")
+
+
+def test_a_batch_that_cannot_begin(cli, mapped, tmp_path) -> None:
+    (tmp_path / "q.jsonl").write_text('{"id": 1, "text": "the refrigerator"}\n')
+    batch = ("--batch", tmp_path / "q.jsonl", "--out", tmp_path / "a.jsonl")
+    for arguments, reason in (
+        ((*batch, "--graph", tmp_path / "no"), "no: no graph.json here"),
+        ((*batch, "--graph", mapped, "--k", 0), "k: expected a whole number"),
+        ((*batch, "--graph", mapped, "--mode", "model"), "mode: expected one of"),
+        (("--batch", tmp_path / "no", *batch[2:], "--graph", mapped), "no: cannot read: No such file"),
+    ):
+        done = cli("ask", *arguments)
+        assert done.code == 1 and reason in done.reason
+    for arguments in (
+        (),
+        (mapped, "--out", "a"),
+        (mapped, "a chair", *batch),
+        batch[:2],
+        ("--graph", mapped, "a", "b"),
+    ):
+        assert cli("ask", *arguments).code == 2
+    assert not (tmp_path / "a.jsonl").exists()
 
 
 def test_a_folder_without_a_map(cli, tmp_path) -> None:

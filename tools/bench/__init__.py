@@ -26,6 +26,7 @@ from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.messages import Keyframe
 from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.recording import RecordingWriter
+from placegraph.tools.bench.contract import fuzz
 from placegraph.tools.bench.growth import Sample, drawing, grow, p95_by_floor
 
 IMAGE = {"width": 640, "height": 480}  # what an OAK-D gives
@@ -231,11 +232,16 @@ def bench(
     ] = None,
     floors: Annotated[int, typer.Option(min=1, help="Of that building.")] = 10,
     rooms: Annotated[int, typer.Option(min=1, help="Of each of its floors.")] = 20,
+    requests: Annotated[
+        int, typer.Option("--fuzz", min=0, help="Instead: put so many broken and hostile requests to the reasoner.")
+    ] = 0,
+    mode: Annotated[str, typer.Option(help="Of those requests: program, rules or deductive.")] = "program",
+    seed: Annotated[int, typer.Option(min=0, help="Of those requests and of the house they are about.")] = 0,
 ) -> None:
     """Measure each part on this machine: times, and ratios to baselines of the same run. Takes under a minute.
 
     Times are CPU time, for the bus elapsed time, medians of many. They differ between machines; ratios say whether a
-    part has become worse.
+    part has become worse. With --fuzz the exit status is 1 when a reply broke its contract.
     """
     if growth is not None:
         samples = grow(floors, rooms)
@@ -243,6 +249,12 @@ def bench(
         p95 = p95_by_floor(samples)
         document = {"p95_ms": p95, "keyframes": len(samples), "voxels": samples[-1].voxels, "ratio": p95[-1] / p95[0]}
         print(json.dumps(document, indent=1) if as_json else growth_table(samples))
+        return
+    if requests:
+        outcome = fuzz(requests, mode=mode, seed=seed)
+        print(json.dumps(outcome.document(), indent=1))
+        if outcome.faults:
+            raise typer.Exit(1)
         return
     costs = measure()
     if as_json:

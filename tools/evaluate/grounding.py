@@ -78,7 +78,7 @@ class StoredGraph:
     def ask(self, text: str, viewpoint_map: F64 | None) -> Reply:
         """Ask one question; viewpoint (3,) in metres, map frame. Raises QueryError when it is no question."""
         viewpoint = None if viewpoint_map is None else viewpoint_map.tolist()
-        question = make_question(text, viewpoint=viewpoint)
+        question = make_question(text, pose=viewpoint)
         began = time.perf_counter()
         answers = [message for message in self._node.step(question) if isinstance(message, Answer)]
         ms = (time.perf_counter() - began) * 1e3

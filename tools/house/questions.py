@@ -32,7 +32,7 @@ F64 = NDArray[np.float64]
 SALT = 8_009  # keeps the questions' randomness apart from what else is drawn from the seed
 MOST_PER_TARGET = 3
 SMALL_TARGET_M = 0.15  # smaller ones are asked for where nothing better is left
-FIELDS = ("text", "target", "box", "form", "anchors", "room", "floor", "viewpoint")
+FIELDS = ("text", "target", "box", "form", "anchors", "room", "floor", "viewpoint", "program")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,9 @@ class AskedQuestion:
     room: int  # of the target
     floor: int
     viewpoint: F64 | None = None  # (3,) the eyes of the asker, where the answer depends on them
+    program: str = (
+        ""  # what it means, in the words of nodes/grounding/notation.py; "" in files from before there was one
+    )
 
 
 def questions(house: House, seed: int, count: int = 60) -> list[AskedQuestion]:
@@ -63,16 +66,13 @@ def questions(house: House, seed: int, count: int = 60) -> list[AskedQuestion]:
     asked: list[AskedQuestion] = []
     texts: list[str] = []
     for request in _chosen(scene, requests_by_form(scene, random), count, random):
-        text, anchors = spoken(request, random)
+        text, anchors, program = spoken(request, random)
         one = request.target.id
         box = np.stack((scene.low[one], scene.high[one]))
         if text not in texts:
             texts.append(text)
-            asked.append(
-                AskedQuestion(
-                    text, one, box, request.form, anchors, int(scene.room[one]), int(scene.floor[one]), request.eye
-                )
-            )
+            room, floor = int(scene.room[one]), int(scene.floor[one])
+            asked.append(AskedQuestion(text, one, box, request.form, anchors, room, floor, request.eye, program))
     return asked
 
 
@@ -136,6 +136,7 @@ def to_json(asked: Sequence[AskedQuestion]) -> list[dict[str, Any]]:
             "room": one.room,
             "floor": one.floor,
             "viewpoint": None if one.viewpoint is None else np.round(one.viewpoint, 3).tolist(),
+            "program": one.program,
         }
         for one in asked
     ]
@@ -147,6 +148,8 @@ def from_json(values: Sequence[dict[str, Any]]) -> list[AskedQuestion]:
 
 
 def _read(value: dict[str, Any], place: int) -> AskedQuestion:
+    if isinstance(value, dict) and "program" not in value:
+        value = value | {"program": ""}  # a file from before questions had one
     if not isinstance(value, dict) or sorted(value) != sorted(FIELDS):
         raise SourceError(f"question {place}: expected the fields {', '.join(FIELDS)}")
     try:
@@ -156,4 +159,5 @@ def _read(value: dict[str, Any], place: int) -> AskedQuestion:
         anchors = tuple(int(one) for one in value["anchors"])
     except (TypeError, ValueError):
         raise SourceError(f"question {place}: a number, the box or the viewpoint is damaged") from None
-    return AskedQuestion(str(value["text"]), ids[0], box, str(value["form"]), anchors, ids[1], ids[2], eye)
+    text, form, program = (str(value[name]) for name in ("text", "form", "program"))
+    return AskedQuestion(text, ids[0], box, form, anchors, ids[1], ids[2], eye, program)

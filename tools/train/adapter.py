@@ -1,4 +1,4 @@
-"""The adapter of the reader as a GGUF file that llama.cpp loads beside the model (llama.cpp, llama-adapter.cpp)."""
+"""The adapter of the reader as a GGUF file that llama.cpp loads beside the model. Source: llama-adapter.cpp."""
 
 from __future__ import annotations
 

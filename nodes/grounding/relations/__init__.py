@@ -1,68 +1,68 @@
 """Spatial relations, computed when a question needs them: one family per module, each exporting RELATION.
 
-A family maps relation names to the phrases that trigger them and judges targets against anchors by their boxes.
-Nothing is forced: outside its margin a relation does not hold, and the evidence sentence says so with the numbers.
+A family judges all pairs of targets and anchors at once by their boxes. A relation's fit is 0..1 and holds from 0.5 on;
+nothing is forced: the evidence sentence of a pair says the numbers. A rank gives a measure instead, greatest first.
 Source: METHOD section 9; paper, "Selecting Related Objects" (semantic and metric edges between targets and anchors).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.nodes.grounding.boxes import F64, I64, Boxes, Layout
+from placegraph.nodes.grounding.view import Views
 from placegraph.runtime.node import available, plugin
-from placegraph.runtime.scene_graph import Node
 
-F64 = NDArray[np.float64]
-UP = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass(frozen=True, eq=False)
-class Viewpoint:
-    """From where left, right, front and behind are meant: (3,) metres, world frame, and whose place that is."""
-
-    source: str  # "asker" or "room centre"
-    xyz_world: F64
+HOLDS = 0.5  # a relation holds from this fit on
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is asked of a relation: which of the targets stand so to one of the anchor tuples."""
+    """What is asked of a relation: how all targets (n) stand to all anchors (m).
+
+    seconds: for "between" the other anchor of each pair, as many as anchors. hint: what else the targets are told by,
+    which says from where they are seen when nothing else does. Without a thing (`corner`, ranks) there are no anchors.
+    """
 
     relation: str
-    targets: Sequence[Node]
-    anchors: Sequence[tuple[Node, ...]]  # alternatives; one node each, two for "between", empty for ranks
-    viewpoints: dict[str, Viewpoint]  # by node id, one for each target and anchor
-    room_boxes: dict[str, F64]  # (2, 3) box of the room that holds a node, by node id; empty: in no room
-    ordinal: int = 1  # 1: the first by rank, 2: the second, ...
+    targets: Boxes
+    anchors: Boxes | None
+    layout: Layout
+    views: Views
+    seconds: Boxes | None = None
+    hint: Boxes | None = None
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """How well one target fits: score 0..1, whether the relation holds, and the sentence that says why."""
+@dataclass(frozen=True, eq=False)
+class Fits:
+    """values (n, m), m = 1 without anchors; the sentence of a pair; of ranks the margin below which none is greater.
 
-    score: float
-    holds: bool
-    sentence: str
-    anchor_ids: tuple[str, ...] = ()
+    trust: 0..1, how much it decides; below 1 where no viewer was named.
+    """
+
+    values: F64
+    sentence: Callable[[int, int], str]
+    margin: float = 0.0
+    trust: float = 1.0
+    known: bool = True  # False: the map holds no evidence for it
+    view: str = ""  # whose view it is, where one matters
 
 
 @dataclass(frozen=True)
 class Relation:
-    """One family: trigger phrases by relation name, anchors each takes, and the judge (one verdict a target)."""
+    """One family: the phrases that the rules know each relation by, and the judge of all of them."""
 
     phrases: dict[str, tuple[str, ...]]
-    anchors: dict[str, tuple[int, int]]  # fewest and most anchors by relation name
-    judge: Callable[[Case], list[Verdict]]
+    judge: Callable[[Case], Fits]
 
 
 @cache
 def families() -> dict[str, Relation]:
-    """Every relation name with its family, found by file name."""
+    """Every relation and rank by its name in the schema, found by file name."""
     found: dict[str, Relation] = {}
     for module in available(__package__ or ""):
         family: Relation = plugin(__package__ or "", module, "RELATION", "relation")
@@ -78,51 +78,39 @@ def triggers() -> dict[tuple[str, ...], str]:
     }
 
 
-def is_rank(relation: str) -> bool:
-    """Whether a relation orders the targets (largest, leftmost, closest), so that an ordinal counts."""
-    return families()[relation].anchors[relation][0] == 0 and not relation.startswith(("in the", "against"))
+def gaps_m(a: Boxes, b: Boxes) -> F64:
+    """(n, m, 3) free metres between boxes along each axis, negative where they overlap by so much."""
+    return np.maximum(a.low[:, None] - b.high[None], b.low[None] - a.high[:, None])
 
 
-def label(node: Node) -> str:
-    """A node in a sentence: `chair O3`."""
-    return f"{node.name} {node.id}"
+def apart_m(gaps: F64) -> F64:
+    """(n, m) metres between the surfaces of boxes; 0 where they touch."""
+    return np.asarray(np.linalg.norm(np.maximum(gaps, 0), axis=2))
 
 
-def best_over_anchors(case: Case, judge_pair: Callable[[Node, tuple[Node, ...]], Verdict]) -> list[Verdict]:
-    """For each target the best verdict over the anchor tuples it is not part of; the first one among equals."""
-    verdicts = []
-    for target in case.targets:
-        pairs = [anchors for anchors in case.anchors if target.id not in {anchor.id for anchor in anchors}]
-        judged = [judge_pair(target, anchors) for anchors in pairs]
-        if judged:
-            verdicts.append(max(judged, key=lambda verdict: (verdict.holds, verdict.score)))
-        else:
-            verdicts.append(Verdict(0.0, False, f"{label(target)} has nothing to be {case.relation} to"))
-    return verdicts
+def flat_m(gaps: F64) -> F64:
+    """(n, m) the same as seen from above."""
+    return np.asarray(np.linalg.norm(np.maximum(gaps[..., :2], 0), axis=2))
 
 
-def ranked(case: Case, values: Sequence[float], margin: float, sentences: Sequence[str]) -> list[Verdict]:
-    """Verdicts of a superlative: values (N,), greatest first. The n-th holds; those within the margin of it hold too.
-
-    margin: in the unit of the values; two targets closer than that cannot be told apart.
-    """
-    order = sorted(range(len(values)), key=lambda i: (-values[i], i))
-    if case.ordinal > len(order):
-        return [Verdict(0.0, False, f"{text}; there are only {len(order)}, not {case.ordinal}") for text in sentences]
-    wanted = values[order[case.ordinal - 1]]
-    place = {i: rank + 1 for rank, i in enumerate(order)}
-    verdicts = []
-    for i, value in enumerate(values):
-        holds = abs(value - wanted) <= margin or place[i] == case.ordinal
-        # a near miss keeps some score, so that candidates are listed in a sensible order
-        score = 1.0 if place[i] == case.ordinal else 0.97 if holds else 0.5 / (1 + abs(place[i] - case.ordinal))
-        verdicts.append(Verdict(score, holds, f"{sentences[i]}, number {place[i]} of {len(order)}"))
-    return verdicts
+def halving(values_m: F64, half_m: float) -> F64:
+    """1 at 0 m, 0.5 at half_m, and so on."""
+    return np.asarray(np.power(0.5, np.maximum(values_m, 0) / half_m))
 
 
-def overlap_xy(a: F64, b: F64) -> float:
-    """Share 0..1 of the smaller footprint of two (2, 3) boxes that lies over the other; thin ones grow by 1 cm."""
-    low, high = np.maximum(a[0, :2], b[0, :2]), np.minimum(a[1, :2], b[1, :2])
-    common = np.prod(np.clip(high - low, 0, None) + 0.01 * (high >= low))
-    smaller = min(np.prod(a[1, :2] - a[0, :2] + 0.01), np.prod(b[1, :2] - b[0, :2] + 0.01))
-    return float(min(common / smaller, 1.0))
+def share_over(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = False) -> F64:
+    """(n, m) share of the target's footprint (smaller: of the smaller one's) that lies over or under the anchor's."""
+    low = np.maximum(targets.low[:, None, :2], anchors.low[None, :, :2])
+    high = np.minimum(targets.high[:, None, :2], anchors.high[None, :, :2])
+    common = np.prod(np.clip(high - low, 0, None) + 0.01 * (high >= low), axis=2)
+    area = np.prod(targets.size[:, :2] + 0.01, axis=1)[:, None]
+    if smaller:
+        area = np.minimum(area, np.prod(anchors.size[:, :2] + 0.01, axis=1)[None])
+    return np.asarray(np.minimum(common / area, 1.0) * (gaps[..., :2].max(axis=2) <= 0))
+
+
+def order(values: F64) -> I64:
+    """(n,) the place of each value, 1: the greatest; equal ones in their order."""
+    places = np.empty(len(values), np.int64)
+    places[np.argsort(-values, kind="stable")] = np.arange(1, len(values) + 1)
+    return places

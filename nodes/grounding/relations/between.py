@@ -7,36 +7,37 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.relations import Case, Relation, Verdict, best_over_anchors, label
-from placegraph.runtime.scene_graph import Node
+from placegraph.nodes.grounding.relations import Case, Fits, Relation
 
-ALONG = (0.1, 0.9)  # departs: share of the way from one centre to the other
-ASIDE_SHARE = 0.5  # departs: distance beside the line, as a share of its length
+ASIDE_SHARE = 0.5  # departs: distance beside the line, as a share of its length, at which it is half between
 ASIDE_LEAST_M = 0.4  # departs: for anchors that stand close together
+LENGTH_M = 6.0  # departs: of several pairs of a kind the closer pair is meant
 
 
-def judge(case: Case) -> list[Verdict]:
-    """One verdict a target, over pairs of anchors."""
+def judge(case: Case) -> Fits:
+    """All targets and pairs of anchors."""
+    first, second = case.anchors, case.seconds
+    assert first is not None and second is not None
+    a, b = first.center[:, :2], second.center[:, :2]
+    line = b - a
+    length = np.maximum(np.linalg.norm(line, axis=1), 1e-6)
+    offset = case.targets.center[:, None, :2] - a[None]
+    along = np.einsum("nmk,mk->nm", offset, line) / length**2
+    aside = np.abs(offset[..., 0] * line[None, :, 1] - offset[..., 1] * line[None, :, 0]) / length
+    widest = np.maximum(ASIDE_SHARE * length, ASIDE_LEAST_M)
+    inner = np.clip((0.5 - np.abs(along - 0.5)) * 5, 0, 1)  # a half at a tenth of the way, whole from a fifth on
+    rise = np.abs(case.targets.center[:, None, 2] - ((first.center + second.center) / 2)[None, :, 2])
+    inner = inner * (1 - 1.2 * np.abs(along - 0.5))  # the nearer to the middle the better
+    values = inner * np.power(0.5, (aside / widest) ** 2 + length / LENGTH_M / 4 + np.maximum(rise - 1, 0))
 
-    def judge_pair(target: Node, anchors: tuple[Node, ...]) -> Verdict:
-        a, b = anchors[0], anchors[1]
-        line, offset = (b.center - a.center)[:2], (target.center - a.center)[:2]
-        length = max(float(np.linalg.norm(line)), 1e-6)
-        along = float(offset @ line) / length**2
-        aside = float(np.linalg.norm(offset - along * line))
-        widest = max(ASIDE_SHARE * length, ASIDE_LEAST_M)
-        holds = ALONG[0] <= along <= ALONG[1] and aside <= widest
-        score = float((1 - abs(2 * along - 1) / 2) * (1 - aside / widest / 2)) if holds else 0.0
-        text = (
-            f"{label(target)} is {along:.0%} of the way from {label(a)} to {label(b)}, {aside:.2f} m beside that line"
-        )
-        return Verdict(score, holds, text, (a.id, b.id))
+    def sentence(i: int, j: int) -> str:
+        ends = f"from {first.labels[j]} to {second.labels[j]}"
+        return f"{case.targets.labels[i]} is {along[i, j]:.0%} of the way {ends}, {aside[i, j]:.2f} m beside that line"
 
-    return best_over_anchors(case, judge_pair)
+    return Fits(values, sentence)
 
 
 RELATION = Relation(
-    phrases={"between": ("between", "in between", "in the middle of", "amid")},
-    anchors={"between": (2, 2)},
+    phrases={"between": ("between", "in between", "amid", "in the middle of the two", "in the middle of two")},
     judge=judge,
 )

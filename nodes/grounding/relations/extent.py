@@ -1,59 +1,60 @@
-"""Largest, smallest, tallest, highest, lowest among the targets.
+"""Largest, smallest, tallest, shortest, longest, highest, lowest among the targets.
 
-Source: METHOD section 9. Departs: by box volume, box height, and height of the centre.
+Source: METHOD section 9. Departs: size by the two longer sides first, as the third of flat things is mostly noise.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.relations import Case, Relation, Verdict, label, ranked
-from placegraph.runtime.scene_graph import Node
+from placegraph.nodes.grounding.boxes import F64, Boxes
+from placegraph.nodes.grounding.relations import Case, Fits, Relation
 
-SIZE_MARGIN = 0.05  # departs: log of volume; 5 % is below what boxes from a depth camera can tell
+THIRD = 0.25  # departs: how much the shortest side counts
+SIZE_MARGIN = 0.05  # departs: log of size; 5 % is below what boxes from a depth camera can tell
 HEIGHT_MARGIN_M = 0.05  # departs: as above, in metres
 
 
-def _measure(relation: str, node: Node) -> tuple[float, float, str]:
-    """Value (greatest first), margin in its unit, and words."""
-    size = np.maximum(np.ptp(node.box, axis=0), 0.01)
-    if relation in ("largest", "smallest"):
-        volume = float(np.prod(size))
-        value = float(np.log(volume))
-        return (
-            (value if relation == "largest" else -value),
+def bulk(boxes: Boxes) -> F64:
+    """(N,) log of how large things look."""
+    sides = np.sort(np.maximum(boxes.size, 0.02), axis=1)
+    return np.asarray(np.log(sides[:, 2]) + np.log(sides[:, 1]) + THIRD * np.log(sides[:, 0]))
+
+
+def length_m(boxes: Boxes) -> F64:
+    """(N,) the longer horizontal side."""
+    return np.asarray(boxes.size[:, :2].max(axis=1))
+
+
+def judge(case: Case) -> Fits:
+    """One value a target, greatest first."""
+    boxes, name = case.targets, case.relation
+    sign = -1.0 if name in ("smallest", "shortest", "lowest") else 1.0
+    if name in ("largest", "smallest"):
+        volume = np.prod(boxes.size, axis=1)
+        return Fits(
+            sign * bulk(boxes)[:, None],
+            lambda i, _: f"{boxes.labels[i]} fills a box of {volume[i]:.3f} m3",
             SIZE_MARGIN,
-            f"{label(node)} fills a box of {volume:.3f} m3",
         )
-    if relation in ("tallest", "shortest"):
-        value = float(size[2])
-        words = f"{label(node)} is {value:.2f} m tall"
-        return (value if relation == "tallest" else -value), HEIGHT_MARGIN_M, words
-    if relation in ("longest", "longer"):
-        value = float(size[:2].max())
-        return value, HEIGHT_MARGIN_M, f"{label(node)} is {value:.2f} m long"
-    value = float(node.center[2])
-    words = f"the middle of {label(node)} is at a height of {value:.2f} m"
-    return (value if relation == "highest" else -value), HEIGHT_MARGIN_M, words
-
-
-def judge(case: Case) -> list[Verdict]:
-    """One verdict a target."""
-    found = [_measure(case.relation, target) for target in case.targets]
-    margin = found[0][1] if found else 0.0
-    return ranked(case, [value for value, _, _ in found], margin, [words for _, _, words in found])
+    if name in ("tallest", "shortest"):
+        values, words = boxes.size[:, 2], "{} is {:.2f} m tall"
+    elif name == "longest":
+        values, words = length_m(boxes), "{} is {:.2f} m long"
+    else:
+        values, words = boxes.center[:, 2], "the middle of {} is at a height of {:.2f} m"
+    return Fits(sign * values[:, None], lambda i, _: words.format(boxes.labels[i], values[i]), HEIGHT_MARGIN_M)
 
 
 RELATION = Relation(
     phrases={
-        "largest": ("largest", "biggest", "widest", "most spacious", "bigger", "larger"),
+        "largest": ("largest", "biggest", "most spacious", "bigger", "larger"),
         "smallest": ("smallest", "tiniest", "littlest", "narrowest", "smaller"),
         "tallest": ("tallest", "taller"),
         "shortest": ("shortest", "shorter"),
-        "longest": ("longest", "longer"),
+        "longest": ("longest", "longer", "widest", "wider"),
         "highest": ("highest", "topmost", "uppermost", "higher"),
         "lowest": ("lowest", "bottommost", "lower"),
     },
-    anchors=dict.fromkeys(("largest", "smallest", "tallest", "shortest", "longest", "highest", "lowest"), (0, 0)),
     judge=judge,
 )

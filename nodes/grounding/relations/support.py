@@ -1,95 +1,158 @@
-"""On, under and inside, by contact and containment of boxes.
+"""On, under, above, in, and their inverses: holds, with. By footprints, tops and bottoms of boxes.
 
-Source: METHOD section 9. Departs: margins for what a depth camera measures; 1 mm contact is never seen.
+Source: METHOD section 9. Departs: graded, for what a depth camera measures; 1 mm contact is never seen.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.relations import Case, Relation, Verdict, best_over_anchors, label, overlap_xy
-from placegraph.runtime.scene_graph import Node
-
-CONTACT_M = 0.15  # departs: largest gap between the bottom of what lies and the top of what carries
-SINK_SHARE = (
-    0.6  # departs: a cushion sinks into a sofa whose box includes the back: bottom inside, top above the middle
+from placegraph.nodes.grounding.boxes import F64, Boxes
+from placegraph.nodes.grounding.relations import (
+    Case,
+    Fits,
+    Relation,
+    apart_m,
+    flat_m,
+    gaps_m,
+    halving,
+    share_over,
 )
-LEAST_OVERLAP = 0.5  # departs: share of the smaller footprint over the other
-INSIDE_SHARE = 0.7  # departs: share of the target's volume within the anchor's box
-HANGS_M, HANGS_FIT = 0.5, 0.5  # departs: sideways gap to what hangs over something, and how well that is "under"
+
+CONTACT_M = 0.15  # departs: gap between what lies and what carries it, at which it is half likely to lie on it
+STANDS_SHARE = 0.5  # departs: what stands in the upper half of a box stands on it: a bed's box includes its headboard
+HANGS_M, HANGS_SHARE = 0.1, 0.7  # departs: what touches an upright thing, off its bottom, hangs on it ("on the wall")
+WITHIN_SHARE, ON_SHARE = 0.8, 0.9  # departs: how well what is inside is "on", and what is on top is "in"
+SPOT_M, CORNER_M = 0.02, 0.8  # departs: "in the corner": a corner or middle of a room is no box that holds things
+OFF_GROUND_M = 0.3
+WALL_M = 0.4  # departs: room boxes end inside the wall or beyond it
+ASIDE_M = 0.3  # departs: a picture hangs above the sofa that it does not overlap; half as likely at this distance
+RISE_M = 3.0  # departs: of two things above the table, the closer one is meant, a little
+MIX_M = 0.1  # departs: heights that differ by less are level
+INSIDE_SHARE = 0.7  # departs: share of the target's volume within the anchor's box from which on it is inside
+OPEN_BELOW = ("table", "desk", "chair", "bed", "bench", "stool", "sofa", "couch", "armchair", "piano", "sink")
+RAISED = 0.3  # departs: what is within the box of these is in or on them only when it is off the floor by this share
 GROWN_M = 0.05  # departs: the anchor's box is grown by this, for what was measured of its walls
+PART_M, BESIDE_M = 0.1, 0.75  # departs: "with" also means a part that touches, and what stands right beside
 
 
-def _on(target: Node, anchor: Node) -> Verdict:
-    gap = float(target.box[0, 2] - anchor.box[1, 2])
-    over = overlap_xy(target.box, anchor.box)
-    height = float(np.ptp(anchor.box[:, 2]))
-    sunk = -SINK_SHARE * height <= gap < 0 and target.center[2] > anchor.center[2]
-    smaller = np.prod(np.ptp(target.box, axis=0)[:2]) <= 1.5 * np.prod(np.ptp(anchor.box, axis=0)[:2])
-    holds = bool((abs(gap) <= CONTACT_M or sunk) and over >= LEAST_OVERLAP and smaller)
-    score = over * float(np.exp(-abs(gap) / (CONTACT_M if gap > 0 else 1.0)))
-    height_words = f"{abs(gap):.2f} m {'above' if gap > 0 else 'below'}" if abs(gap) >= 0.005 else "level with"
-    text = f"the bottom of {label(target)} is {height_words} the top of {label(anchor)}, {over:.0%} of it over it"
-    return Verdict(score if holds else 0.0, holds, text, (anchor.id,))
+def on_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+    """(n, m): the target rests on the anchor, or hangs on it."""
+    over = share_over(targets, anchors, gaps)
+    gap = targets.low[:, None, 2] - anchors.high[None, :, 2]
+    height = anchors.size[None, :, 2]
+    raised = (targets.low[:, None, 2] - anchors.low[None, :, 2]) / (STANDS_SHARE * height)
+    # a bottom below the top: thin things lie in the noise of both boxes, in thick ones it counts how far up it is
+    sunk = np.maximum(np.clip(raised, 0, 1), halving(-gap, CONTACT_M))
+    above_middle = targets.center[:, None, 2] > anchors.center[None, :, 2]
+    rests = np.clip(over * 1.25, 0, 1) * np.where(gap > 0, halving(gap, CONTACT_M), sunk * above_middle)
+    off = (targets.low[:, None, 2] - anchors.low[None, :, 2]) > OFF_GROUND_M
+    upright = anchors.size[None, :, 2] > targets.size[:, None, 2]
+    hangs = HANGS_SHARE * halving(apart_m(gaps), HANGS_M) * off * upright
+    return np.maximum(rests, hangs)
 
 
-def _under(target: Node, anchor: Node) -> Verdict:
-    over = overlap_xy(target.box, anchor.box)
-    rise = float(anchor.center[2] - target.center[2])
-    lower = rise > 0 and target.box[0, 2] < anchor.box[1, 2] - 0.05 and target.box[1, 2] <= anchor.box[1, 2] + 0.05
-    aside = np.maximum(np.maximum(target.box[0] - anchor.box[1], anchor.box[0] - target.box[1]), 0)[:2]
-    # "under the picture" is said of the sofa before the wall: wholly lower, and close
-    hangs_over = target.box[1, 2] <= anchor.box[0, 2] + 0.05 and float(np.linalg.norm(aside)) <= HANGS_M
-    holds = bool((lower and over >= LEAST_OVERLAP) or hangs_over)
-    text = f"{label(target)} is {rise:.2f} m lower than {label(anchor)}, {over:.0%} of it under it"
-    fit = max(over, HANGS_FIT) * float(np.exp(-max(rise, 0) / 2))
-    return Verdict(fit if holds else 0.0, holds, text, (anchor.id,))
+def under_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+    """(n, m): the target is lower than the anchor, below it or nearly so."""
+    over = share_over(targets, anchors, gaps, smaller=True)
+    rise = anchors.center[None, :, 2] - targets.center[:, None, 2]
+    apart = anchors.low[None, :, 2] - targets.high[:, None, 2]  # negative: they overlap in height
+    lower = np.clip(0.5 + rise / (2 * MIX_M), 0, 1)
+    # without a footprint in common it must be wholly lower: what stands beside a table is not under it
+    aside = 0.8 * halving(flat_m(gaps), ASIDE_M) * np.clip(0.5 + (apart + MIX_M) / (2 * MIX_M), 0, 1)
+    return np.asarray(lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * halving(apart, RISE_M))
 
 
-def _inside(target: Node, anchor: Node) -> Verdict:
-    # what is flatter than 1 cm counts as 1 cm, so that a sheet of paper has a volume
-    middle, half = target.box.mean(axis=0), np.maximum(np.ptp(target.box, axis=0), 0.01) / 2
-    low = np.maximum(middle - half, anchor.box[0] - GROWN_M)
-    high = np.minimum(middle + half, anchor.box[1] + GROWN_M)
-    share = float(np.prod(np.clip(high - low, 0, None) / (2 * half)))
-    holds = share >= INSIDE_SHARE
-    text = f"{share:.0%} of {label(target)} is within {label(anchor)}"
-    return Verdict(share if holds else 0.0, holds, text, (anchor.id,))
+def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+    """(n, m): most of the target is within the anchor; in a room when it belongs to it."""
+    half = targets.size / 2
+    low = np.maximum((targets.center - half)[:, None], anchors.low[None] - GROWN_M)
+    high = np.minimum((targets.center + half)[:, None], anchors.high[None] + GROWN_M)
+    share = np.prod(np.clip(high - low, 0, None), axis=2) / np.prod(2 * half, axis=1)[:, None]
+    fit = np.clip(share * 0.5 / INSIDE_SHARE, 0, 1)
+    legs = np.array([_is_open_below(label) for label in anchors.labels], bool)[None]
+    raised = np.clip((targets.low[:, None, 2] - anchors.low[None, :, 2]) / (RAISED * anchors.size[None, :, 2]), 0, 1)
+    share = np.where(legs, share * raised, share)
+    fit = np.where(legs, fit * raised, fit)
+    rooms = np.array([bool(one) and one[0] == "R" for one in anchors.ids], bool)
+    same = targets.room[:, None] == anchors.room[None]
+    return np.where(rooms[None] & (anchors.room >= 0)[None], same.astype(float), np.where(share > 0.95, 1.0, fit))
 
 
-def judge(case: Case) -> list[Verdict]:
-    """One verdict a target. "In" also holds for what lies on top (books in a shelf, a cup in the sink)."""
+def _is_open_below(label: str) -> bool:
+    return label.rsplit(" ", 2)[-2] in OPEN_BELOW if " " in label else False
 
-    def judge_pair(target: Node, anchors: tuple[Node, ...]) -> Verdict:
-        if case.relation == "on":
-            return _on(target, anchors[0])
-        if case.relation == "under":
-            return _under(target, anchors[0])
-        inside = _inside(target, anchors[0])
-        return inside if inside.holds else _on(target, anchors[0])
 
-    return best_over_anchors(case, judge_pair)
+def judge(case: Case) -> Fits:
+    """All pairs. "In" also holds for what lies on top (books in a shelf, a cup in the sink)."""
+    targets, anchors = case.targets, case.anchors
+    assert anchors is not None
+    gaps = gaps_m(targets, anchors)
+    name = case.relation
+    if name == "on":
+        # "on" is said of a cup in a cupboard's box too: shelves, racks, counters with a wall behind
+        values = np.maximum(on_fit(targets, anchors, gaps), WITHIN_SHARE * in_fit(targets, anchors, gaps))
+        walls = np.array([not one for one in anchors.ids], bool) & (anchors.size[:, 2] > 1.0)
+        off = targets.low[:, None, 2] - anchors.low[None, :, 2] > OFF_GROUND_M
+        values = np.where(walls[None], HANGS_SHARE * halving(flat_m(gaps), WALL_M) * off, values)
+    elif name == "in":
+        values = np.maximum(in_fit(targets, anchors, gaps), ON_SHARE * on_fit(targets, anchors, gaps))
+    elif name == "under":
+        values = under_fit(targets, anchors, gaps)
+    elif name == "above":
+        values = under_fit(anchors, targets, gaps.swapaxes(0, 1)).T
+    else:
+        values = _carries(targets, anchors, gaps)
+        if name == "with":
+            gap = apart_m(gaps)
+            values = np.maximum(values, np.maximum(0.9 * halving(gap, PART_M), 0.7 * halving(gap, BESIDE_M)))
+    spots = np.array([not one for one in anchors.ids], bool) & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
+    if name in ("in", "on"):
+        values = np.where(spots[None], halving(flat_m(gaps), CORNER_M), values)
+    return Fits(values, lambda i, j: _sentence(case, i, j))
+
+
+def _carries(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+    turned = gaps.swapaxes(0, 1)
+    return np.maximum(on_fit(anchors, targets, turned), in_fit(anchors, targets, turned)).T
+
+
+def _sentence(case: Case, i: int, j: int) -> str:
+    assert case.anchors is not None
+    one, other = case.targets.take([i]), case.anchors.take([j])
+    name = case.relation
+    if name in ("holds", "with"):
+        one, other = other, one
+    gaps = gaps_m(one, other)
+    over = float(share_over(one, other, gaps, smaller=name in ("under", "above"))[0, 0])
+    a, b = one.labels[0], other.labels[0]
+    if name in ("under", "above"):
+        rise = float(one.center[0, 2] - other.center[0, 2])
+        word = "higher" if rise > 0 else "lower"
+        aside = float(flat_m(gaps)[0, 0])
+        beside = f"{over:.0%} of it {'over' if rise > 0 else 'under'} it" if over else f"{aside:.2f} m aside"
+        return f"{a} is {abs(rise):.2f} m {word} than {b}, {beside}"
+    inside = float(in_fit(one, other, gaps)[0, 0])
+    if name == "in" and inside >= 0.5:
+        return f"{a} is within {b}"
+    gap = float(one.low[0, 2] - other.high[0, 2])
+    if name == "with" and over < 0.1:
+        return f"{a} is {float(apart_m(gaps)[0, 0]):.2f} m from {b}"
+    level = f"{abs(gap):.2f} m {'above' if gap > 0 else 'below'}" if abs(gap) >= 0.005 else "level with"
+    return f"the bottom of {a} is {level} the top of {b}, {over:.0%} of it over it"
 
 
 RELATION = Relation(
     phrases={
         "on": (
-            "on",
-            "on top of",
-            "atop",
-            "upon",
-            "onto",
-            "standing on",
-            "lying on",
-            "sitting on",
-            "resting on",
-            "placed on",
-            "on the top of",
-            "supported by",
+            "on", "on top of", "atop", "upon", "onto", "standing on", "lying on", "sitting on", "resting on",
+            "placed on", "on the top of", "supported by", "hanging on", "hung on", "mounted on",
         ),
-        "under": ("under", "underneath", "beneath", "supporting", "holding"),
-        "inside": ("in", "inside", "inside of", "within", "contained in", "into"),
+        "under": ("under", "underneath", "beneath", "below", "lower than", "supporting", "tucked under"),
+        "above": ("above", "over", "hanging over", "higher than", "on the wall above", "hanging above"),
+        "in": ("in", "inside", "inside of", "within", "contained in", "into"),
+        "holds": ("holding", "containing", "contains", "carrying"),
+        "with": ("with", "that has", "which has", "that have"),
     },
-    anchors={"on": (1, 1), "under": (1, 1), "inside": (1, 1)},
     judge=judge,
-)
+)  # fmt: skip

@@ -1,5 +1,6 @@
 """A hand-made house: a kitchen and a living room below, a bedroom above."""
 
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -83,7 +84,7 @@ def make_graph_message(graph, named=True, revision=1, final=False, frame_id=7):
     return Graph(frame_id=frame_id, stamp_ns=9, revision=revision, final=final, named=named, json=graph.to_json())
 
 
-def make_question(text, viewpoint=(np.nan,) * 3, k=3, mode="program", question_id="q1"):
+def make_question(text, viewpoint=(np.nan,) * 3, k=3, mode="rules", question_id="q1"):
     return Question(
         frame_id=-1, stamp_ns=0, question_id=question_id, text=text, k=k, mode=mode,
         viewpoint_world=np.array(viewpoint, np.float64),
@@ -100,22 +101,44 @@ def unnamed_house():
     return make_house(named=False)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def node_of():
     return make_node
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def thing_of():
     return thing
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
+def room_of():
+    """Makes a graph of objects (name, centre, size) in one room without a name, as lists of boxes are imported."""
+
+    def make(*things, fronts=None):
+        boxes = np.array([(np.array(c, float) - np.array(s) / 2, np.array(c) + np.array(s) / 2) for _, c, s in things])
+        low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        places = [make_node("B0", "", "", low, high), make_node("F0", "B0", "", low, high)]
+        places.append(make_node("R0", "F0", "", low, high))
+        nodes = [thing(i, "R0", name, center, size) for i, (name, center, size) in enumerate(things)]
+        for i, front in (fronts or {}).items():
+            nodes[i] = dataclasses.replace(nodes[i], front=front)
+        return SceneGraph.of(places + nodes)
+
+    return make
+
+
+@pytest.fixture(scope="session")
 def graph_message():
     return make_graph_message
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
+def question_of():
+    return make_question
+
+
+@pytest.fixture(scope="session")
 def ask():
     """Puts a question to a node and returns the answer's fields."""
 

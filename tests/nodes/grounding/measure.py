@@ -1,7 +1,7 @@
 """Right answers, time and calls on the lists of questions beside this file: `python tests/nodes/grounding/measure.py`.
 
-Arguments choose modes (program, model; both without any); -v prints the questions that were answered wrong. "cpu s" is
-the time on the processor, which other jobs on the machine do not change; the node runs on one thread.
+Arguments choose modes (program, rules, deductive; all without any); -v prints the questions that were answered wrong.
+"cpu s" is the time on the processor, which other jobs on the machine do not change; the node runs on one thread.
 """
 
 import importlib.util

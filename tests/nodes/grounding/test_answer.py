@@ -5,6 +5,10 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding import NODE, GroundingConfig
+from placegraph.nodes.grounding.answer import Reasoner
+from placegraph.nodes.grounding.llm import LanguageModel
+from placegraph.nodes.grounding.notation import read
+from placegraph.nodes.grounding.schema import Program
 from placegraph.runtime.node import Context
 from placegraph.runtime.place_graph import Approach, Connection
 from placegraph.runtime.scene_graph import SceneGraph
@@ -37,7 +41,7 @@ def test_what_is_no_question_gets_a_reason(node, ask, text, reason):
 
 @pytest.mark.parametrize(
     ("kwargs", "reason"),
-    [({"mode": "poem"}, "mode 'poem'"), ({"mode": "model"}, "needs the language model"),
+    [({"mode": "poem"}, "mode 'poem'"), ({"mode": "deductive"}, "needs the language model"),
      ({"k": 0}, "k = 0"), ({"viewpoint": (np.nan, 1, 1)}, "viewpoint"),
      ({"viewpoint": (np.inf, 1, 1)}, "viewpoint")],
 )  # fmt: skip
@@ -60,6 +64,24 @@ def test_a_found_object(node, ask):
     assert answer["box"] == [[3.5, 0.5, 3.1], [3.7, 0.7, 3.5]]
     assert answer["evidence"][-1] == "vase O19 is 1.48 m from bed O15, closest first, number 1 of 3"
     assert answer["viewpoint"]["source"] == "room centre"
+
+
+def test_the_parse_is_in_the_answer(node, ask):
+    parse = ask(node, "the red chair near the fridge")["parse"]
+    assert (parse["text"], parse["reader"], parse["confidence"]) == ("chair; is red; near (fridge)", "rules", None)
+    assert Program.model_validate_json(json.dumps(parse["program"])).target == read(parse["text"])
+
+
+def test_without_a_model_the_rules_read(node, ask):
+    assert ask(node, "the red chair", mode="program")["parse"]["reader"] == "rules"
+
+
+def test_a_program_that_is_given_is_executed(house, names, question_of):
+    reasoner = Reasoner(names, LanguageModel(), (), use_model=False)
+    program = Program(target=read("lamp; on (nightstand)"))
+    answer = reasoner.answer_program(house, 4, question_of("whatever"), program)
+    assert (answer["object_id"], answer["revision"], answer["llm_calls"]) == ("O18", 4, 0)
+    assert answer["parse"]["text"] == "lamp; on (nightstand)"
 
 
 def test_the_viewpoint_turns_left_into_right(node, ask):

@@ -113,13 +113,20 @@ def test_a_tie_with_words_left_is_put_to_the_model(node, ask, graph_message, hou
     assert (answer["llm_calls"], answer["sure"]) == (1, False)
 
 
-def test_the_model_reads_and_chooses_whatever_was_asked_before(node, ask, graph_message, house):
+def test_the_model_reads_whatever_was_asked_before(node, ask, graph_message, house):
     node.step(graph_message(house))
     first, second = "find the lamp", "a nightstand"
-    answers = [ask(node, text, mode="model") for text in (first, second, first)]
+    answers = [ask(node, text, mode="program") for text in (first, second, first)]
     assert answers[0] == answers[2]
     for answer in answers:
         assert answer["status"] in ("found", "not_in_map")
-        assert answer["evidence"][0] == "the language model read the question"
-        chosen = any(line.startswith("the language model chose") for line in answer["evidence"])
-        assert answer["llm_calls"] == 1 + chosen
+        assert (answer["parse"]["reader"], answer["llm_calls"]) == ("model", 1)
+
+
+def test_the_deductive_mode_is_asked_for_by_its_name(node, ask, graph_message, house):
+    node.step(graph_message(house))
+    answer = ask(node, "find the lamp upstairs", mode="deductive")
+    assert answer["status"] in ("found", "not_in_map")
+    assert answer["evidence"][0] == "read level by level (deductive mode)"
+    assert answer["llm_calls"] >= 2
+    assert set(answer["parse"]) == {"floors", "rooms", "locations", "targets", "anchors"}

@@ -159,3 +159,43 @@ def test_an_adapter_that_is_not_there_or_does_not_fit_is_named(tmp_path, model):
             LanguageModel(adapter_path=broken).load()
     with pytest.raises(ModelError, match=r"Q4_1\.gguf: llama\.cpp cannot load it as an adapter"):
         LanguageModel(adapter_path=default_model_path()).load()
+
+
+def test_a_dialogue_is_in_the_template_of_the_model(model):
+    opening, closing = model.dialogue("Say yes. ")
+    assert opening.endswith("<|im_start|>user\nSay yes. ")
+    assert closing == "<|im_end|>\n<|im_start|>assistant\n"
+    grammar = "root ::= " + enum_rule(["yes", "no"])
+    replies = {model.complete("Now", grammar, 8, opening=opening, closing=closing) for _ in range(2)}
+    assert len(replies) == 1
+    assert not model.fits(opening, "Now", 256, closing)
+
+
+@pytest.fixture
+def templated(monkeypatch):
+    """A model whose file holds another chat template."""
+
+    def make(template):
+        made = LanguageModel(n_ctx=256)
+        made.load()
+        made._llama.metadata["tokenizer.chat_template"] = template
+        return made
+
+    return make
+
+
+def test_a_model_without_a_template_gets_the_words_alone(templated):
+    assert templated("").dialogue("Say yes. ") == ("Say yes. ", "\n")
+
+
+def test_a_template_sees_no_clock_and_the_marks_of_its_model(templated):
+    template = "{{ bos_token }}{{ strftime_now('%Y') }} {{ messages[0]['content'] }}{{ eos_token }}"
+    assert templated(template).dialogue("Hi ") == ("<|im_start|>2024 Hi ", "<|im_end|>")
+
+
+def test_a_template_that_cannot_be_used_is_named(templated):
+    for template in ("{{ nothing() }}", "{% if %}", "{{ raise_exception('no user') }}"):
+        with pytest.raises(QueryError, match="chat template"):
+            templated(template).dialogue("Hi ")
+    with pytest.raises(QueryError, match="leaves out what the user says"):
+        templated("no words").dialogue("Hi ")

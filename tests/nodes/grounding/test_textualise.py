@@ -1,4 +1,4 @@
-from placegraph.nodes.grounding.ground import Candidate
+from placegraph.nodes.grounding.ranking import Candidate
 from placegraph.nodes.grounding.textualise import small_graph
 
 

@@ -111,8 +111,9 @@ def location_requests(scene: Scene, scopes: tuple[Scope, ...]) -> Iterator[Reque
                     if only(answers, peers) == one:
                         needed = scene.has_twin(one, scope.mask)
                         yield Request(
-                            "location", Mention(one, naming), scope, tails=(f"in the {place.kind}",), needed=needed
-                        )
+                            "location", Mention(one, naming), scope, tails=(f"in the {place.kind}",),
+                            means=(f"room ({place.kind})",), needed=needed,
+                        )  # fmt: skip
 
 
 def _is_alone(scene: Scene, scope: Scope, place: Location) -> bool:

@@ -17,6 +17,10 @@ SAID: dict[str, str] = {
     "next to": "next to the {}", "near": "near the {}", "closest": "closest to the {}",
     "farthest": "farthest from the {}", "between": "between the {} and the {}",
 }  # fmt: skip
+MEANT: dict[str, str] = {
+    "on": "on ({})", "under": "under ({})", "above": "above ({})", "below": "under ({})", "next to": "near ({})",
+    "near": "near ({})", "closest": "closest ({})", "farthest": "farthest ({})", "between": "between ({}, {})",
+}  # fmt: skip
 LONGEST_M = 4.5  # between two anchors
 SMALL = 0.3  # share of a target's longest extent that an anchor needs at least, or it is too small to tell it by
 
@@ -44,7 +48,8 @@ def _targets(scene: Scene, scope: Scope, anchor: Mention, fit: Mask) -> Iterator
 
 
 def _request(scene: Scene, form: str, target: Mention, scope: Scope, anchors: tuple[Mention, ...]) -> Request:
-    return Request(form, target, scope, "", (SAID[form],), anchors, None, scene.has_twin(target.id, scope.mask))
+    needed = scene.has_twin(target.id, scope.mask)
+    return Request(form, target, scope, "", (SAID[form],), (MEANT[form],), anchors, None, needed)
 
 
 def _by_distance(scene: Scene, scope: Scope, anchor: Mention) -> Iterator[Request]:
@@ -105,7 +110,9 @@ def double_requests(
                 if target.id != second.id and scene.has_twin(target.id, scope.mask) and only(joint, peers) == target.id:
                     joiner = " and " if form != "on" else " "
                     tail = joiner.join((SAID[form], SAID[other]))
-                    yield Request("two anchors", target, scope, "", (tail,), (first, second))
+                    yield Request(
+                        "two anchors", target, scope, "", (tail,), (MEANT[form], MEANT[other]), (first, second)
+                    )
 
 
 def chain_requests(scene: Scene, scope: Scope, answers: dict[str, Answers]) -> Iterator[Request]:
@@ -131,7 +138,8 @@ def _chained(
                 continue
             if _is_read_one_way(scene, answers, target, middle.naming, peers, form, last, link):
                 tail = f"{SAID[form]} {SAID[link]}"
-                yield Request("chain", target, scope, "", (tail,), (middle, last))
+                means = MEANT[form].replace("{}", "{{}}; {}").format(MEANT[link])
+                yield Request("chain", target, scope, "", (tail,), (means,), (middle, last))
 
 
 def _is_read_one_way(

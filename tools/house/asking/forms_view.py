@@ -31,6 +31,7 @@ SAID: dict[str, str] = {
     "left": "to the left of the {}", "right": "to the right of the {}",
     "front": "in front of the {}", "behind": "behind the {}",
 }  # fmt: skip
+MEANT: dict[str, str] = {"left": "left ({})", "right": "right ({})", "front": "front ({})", "behind": "behind ({})"}
 COUNTED = ("first", "second", "third", "fourth")
 
 
@@ -55,7 +56,13 @@ def _viewed_from(scene: Scene, scope: Scope, anchor: Mention, stand: Standpoint)
                     continue
                 needed = scene.has_twin(one, peers)
                 tail = SAID[form] + (f" seen from the {stand.door}" if stand.door else "")
-                yield Request(form, Mention(one, naming), scope, "", (tail,), (anchor,), stand.eye, needed)
+                means = (MEANT[form], *_from(stand))
+                yield Request(form, Mention(one, naming), scope, "", (tail,), means, (anchor,), stand.eye, needed)
+
+
+def _from(stand: Standpoint) -> tuple[str, ...]:
+    """The view that is said; that of the asker is not."""
+    return (f"from ({stand.door})",) if stand.door else ()
 
 
 def _fits(scene: Scene, form: str, one: int, anchor: int, peers: np.ndarray) -> bool:
@@ -107,8 +114,10 @@ def _counted(scope: Scope, target: Mention, place: int, row: int, pure: bool, st
     tail = f"as seen from the {stand.door}" if stand.door else "from where I stand"
     for index, end in ((place, "left"), (row - 1 - place, "right")):
         if index == 0:
-            yield Request("ordinal", target, scope, f"{end}most", (tail,), (), stand.eye)
+            means = (f"{end}most", *_from(stand))
+            yield Request("ordinal", target, scope, f"{end}most", (tail,), means, (), stand.eye)
         elif pure and index < len(COUNTED) and row > 2:
-            yield Request("ordinal", target, scope, COUNTED[index], (f"from the {end} {tail}",), (), stand.eye)
+            means = (f"{end}most {index + 1}", *_from(stand))
+            yield Request("ordinal", target, scope, COUNTED[index], (f"from the {end} {tail}",), means, (), stand.eye)
     if pure and row == 3 and place == 1:
-        yield Request("ordinal", target, scope, "middle", (tail,), (), stand.eye)
+        yield Request("ordinal", target, scope, "middle", (tail,), ("middle", *_from(stand)), (), stand.eye)

@@ -20,6 +20,7 @@ class Request:
     scope: Scope
     adjective: str = ""  # stands before the word: red, largest, second
     tails: tuple[str, ...] = ()  # stand behind it: "next to the {}"
+    means: tuple[str, ...] = ()  # the same as conditions of a program, `{}` for the anchors in the same order
     anchors: tuple[Mention, ...] = ()
     eye: F64 | None = None  # (3,) where the asker stands
     needed: bool = True  # whether the word and the scope alone would leave a doubt

@@ -28,6 +28,7 @@ class ScopeWords:
 
     text: str
     inside: Mention | None = None
+    means: tuple[str, ...] = ()  # the same as conditions of a program, `{}` for the item
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ def scopes(scene: Scene) -> tuple[Scope, ...]:
     found = [Scope("house", np.ones(scene.count, bool), (ScopeWords(""),))]
     floors = len(scene.house.floors)
     for index in range(floors if floors > 1 else 0):
-        found.append(Scope("floor", scene.floor == index, tuple(ScopeWords(one) for one in floor_words(index, floors))))
+        found.append(Scope("floor", scene.floor == index, tuple(map(_on_floor, floor_words(index, floors)))))
     for room in scene.house.rooms:
         words = _room_words(scene, room)
         if words:
@@ -66,6 +67,16 @@ def floor_words(index: int, floors: int) -> tuple[str, ...]:
     return ("on the top floor",) if index == floors - 1 else ("on the middle floor",) if floors == 3 else ()
 
 
+def _on_floor(words: str) -> ScopeWords:
+    return ScopeWords(words, means=(f"floor ({words.removeprefix('on the ')})",))
+
+
+def _in_room(text: str, *conditions: str, floor: str = "") -> ScopeWords:
+    """Words for a room, its name first among the conditions; floor: those of the floor that follow it."""
+    place = _on_floor(floor).means if floor else ()
+    return ScopeWords(f"in the {text}{' ' * bool(floor)}{floor}", means=(f"room ({'; '.join(conditions)})", *place))
+
+
 def _alike(scene: Scene, room: Room) -> list[Room]:
     """All rooms that the word for a room may mean, itself among them."""
     kinds = SAME_ROOMS if room.type in SAME_ROOMS else (room.type,)
@@ -76,22 +87,23 @@ def _room_words(scene: Scene, room: Room) -> tuple[ScopeWords, ...]:
     names = ROOM_WORDS.get(room.type, (room.type,))
     alike = _alike(scene, room)
     if len(alike) == 1:
-        return tuple(ScopeWords(f"in the {name}") for name in names)
+        return tuple(_in_room(name, name) for name in names)
     floor_mates = [one for one in alike if one.floor == room.floor]
     words = []
     floors = len(scene.house.floors)
     if floors > 1 and len(floor_mates) == 1:
-        words += [ScopeWords(f"in the {names[0]} {one}") for one in floor_words(room.floor, floors)]
+        words += [_in_room(names[0], names[0], floor=one) for one in floor_words(room.floor, floors)]
         if floors == 2:
-            words.append(ScopeWords(f"in the {'upstairs' if room.floor else 'downstairs'} {names[0]}"))
+            level = "upstairs" if room.floor else "downstairs"
+            words.append(_in_room(f"{level} {names[0]}", names[0], f"floor ({level})"))
     elif floors > 1:
         ending = floor_words(room.floor, floors)
         words += [
-            ScopeWords(f"in the {adjective} {names[0]} {ending[0]}")
+            _in_room(f"{adjective} {names[0]}", names[0], _sized(adjective), floor=ending[0])
             for adjective in _size_words(room, floor_mates)
             if ending
         ]
-    words += [ScopeWords(f"in the {adjective} {names[0]}") for adjective in _size_words(room, alike)]
+    words += [_in_room(f"{size} {names[0]}", names[0], _sized(size)) for size in _size_words(room, alike)]
     return tuple(words + _content_words(scene, room, alike, names[0]))
 
 
@@ -104,6 +116,12 @@ def _size_words(room: Room, rooms: list[Room]) -> tuple[str, ...]:
     if own * AREA_RATIO <= min(others):
         return ("smaller", "small") if len(others) == 1 else ("smallest",)
     return ()
+
+
+def _sized(adjective: str) -> str:
+    return {"larger": "largest", "bigger": "largest", "smaller": "smallest", "small": "is small"}.get(
+        adjective, adjective
+    )
 
 
 def area_m2(room: Room) -> float:
@@ -119,6 +137,7 @@ def _content_words(scene: Scene, room: Room, alike: list[Room], name: str) -> li
     for one in np.flatnonzero(scene.anchors & (scene.room == room.id)).tolist():
         for naming in scene.namings[one]:
             if scene.names[one] != "window" and np.flatnonzero(scene.of(naming.kin) & among).tolist() == [one]:
-                words.append(ScopeWords(f"in the {name} with the {{}}", Mention(one, naming)))
+                means = (f"room ({name}; with ({{}}))",)
+                words.append(ScopeWords(f"in the {name} with the {{}}", Mention(one, naming), means))
                 break
     return words

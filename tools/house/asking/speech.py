@@ -41,22 +41,40 @@ OTHER_ADJECTIVES: dict[str, tuple[str, ...]] = {
     "small": ("small", "smaller", "little"), "highest": ("highest",), "gray": ("gray", "grey"),
 }  # fmt: skip
 
+RANKS = {
+    "largest": "largest", "biggest": "largest", "larger": "largest", "bigger": "largest", "smallest": "smallest",
+    "smaller": "smallest", "tallest": "tallest", "highest": "highest", "lowest": "lowest",
+}  # fmt: skip
+ROW_ADJECTIVES = ("leftmost", "rightmost", "middle", "first", "second", "third", "fourth")
 
-def spoken(request: Request, random: np.random.Generator) -> tuple[str, tuple[int, ...]]:
-    """A request as one sentence, and the ids of all items that it is told by."""
+
+def spoken(request: Request, random: np.random.Generator) -> tuple[str, tuple[int, ...], str]:
+    """A request as one sentence, the ids of all items that it is told by, and what it means as a program's text."""
     noun = _word(request.target.naming, random, UNSAID_TARGET)
     words_of_scope = fitting_words(request)
     scope = words_of_scope[int(random.integers(len(words_of_scope)))]
     words = [_word(anchor.naming, random, UNSAID_ANCHOR) for anchor in request.anchors]
     tail = _reworded(" ".join(request.tails), random).format(*words)
     adjective = request.adjective
+    means = ["; ".join(request.means).format(*words)] if request.means else []
     if adjective:
-        adjective = str(random.choice(OTHER_ADJECTIVES.get(adjective, (adjective,)))) + " "
-    place, ids = scope.text, [anchor.id for anchor in request.anchors]
+        adjective = str(random.choice(OTHER_ADJECTIVES.get(adjective, (adjective,))))
+        means = [*_meant(adjective), *means]
+        adjective += " "
+    place, ids, located = scope.text, [anchor.id for anchor in request.anchors], scope.means
     if scope.inside is not None:
-        place = place.format(_word(scope.inside.naming, random, 0.0))
+        inside = _word(scope.inside.naming, random, 0.0)
+        place, located = place.format(inside), tuple(one.format(inside) for one in located)
         ids.append(scope.inside.id)
-    return _sentence(adjective, noun, tail, place, random), tuple(dict.fromkeys(ids))
+    program = "; ".join([noun, *means, *located])
+    return _sentence(adjective, noun, tail, place, random), tuple(dict.fromkeys(ids)), program
+
+
+def _meant(adjective: str) -> tuple[str, ...]:
+    """What an adjective means: a rank, or how the thing looks; places in a row say themselves what they mean."""
+    if adjective in ROW_ADJECTIVES:
+        return ()
+    return (RANKS.get(adjective, f"is {adjective}"),)
 
 
 def fitting_words(request: Request) -> tuple[ScopeWords, ...]:

@@ -153,6 +153,8 @@ BEFORE: dict[str, tuple[str, ...]] = {
     "farthest": ("farthest", "furthest", "further", "farther", "most distant"),
     "alone": ("solo", "lone", "isolated", "solitary"),
 }  # fmt: skip
+# What hangs or leans is said to do so on a wall; what stands, on the floor.
+BUILT = {"on": ("wall", "floor", "wall", "ground"), "against": ("wall",), "along": ("wall",), "above": ("floor",)}
 BEFORE_WEIGHTS = {
     "leftmost": 6, "rightmost": 6, "middle": 4, "frontmost": 2, "backmost": 2, "largest": 6, "smallest": 6,
     "tallest": 2, "shortest": 1.5, "longest": 2, "highest": 2, "lowest": 2, "closest": 2, "farthest": 2, "alone": 0.7,
@@ -185,7 +187,8 @@ FROM: tuple[str, ...] = (
     "entering by {}",
     "viewed from {}", "from the point of view of {}", "if you stand by {}", "when standing at {}",
     "when you come through {}",
-    "when you walk through {}", "turn like you just walked through {}",
+    "when you walk through {}", "as you walk in {}", "as you enter {}", "when you just walked through {}",
+    "when you walk in through {}", "turn like you just walked through {}",
 )  # fmt: skip
 ENTERING = (
     ("as you enter the room", "enter"), ("when you enter", "enter"), ("as you walk in",

@@ -78,6 +78,8 @@ class Sentences:
         say.target_noun = "" if phrase.noun == SAME_KIND else phrase.noun
         if say.chance(0.27):
             self._rank_before(phrase)
+            if say.chance(0.1):  # the front middle pillow
+                self._rank_before(phrase)
         if say.chance(0.3):
             said, conditions = say.looks(say.random.choice((1, 1, 1, 2, 2, 3)))
             at = 0 if say.chance(0.15) else len(phrase.before)
@@ -97,6 +99,8 @@ class Sentences:
     def _rank_before(self, phrase: NounPhrase) -> None:
         say = self.say
         name = say.weighted(relations.BEFORE_WEIGHTS)
+        if _clash([Condition(name=name)], phrase.conditions):
+            return
         word = say.pick(relations.BEFORE[name])
         luck = say.random.random()
         if luck < 0.06 and name not in ("middle", "alone"):

@@ -124,14 +124,14 @@ class Speaker:
 
     # things that something else is told by ----------------------------------------------------------------------------
 
-    def anchor(self, depth: int, *, simple: bool = False) -> tuple[str, Thing]:
+    def anchor(self, depth: int, *, simple: bool = False, noun: str = "") -> tuple[str, Thing]:
         """A noun phrase with its article, and the thing that it means. simple: nothing behind its noun."""
-        luck = self.random.random()
+        luck = self.random.random() if not noun else 0.5
         if luck < 0.04 and self.target_noun and not simple:
             return self._same_kind()
         if luck < 0.10:
             return self._several()
-        noun = self.plural(self.target_noun) if luck < 0.13 and self.target_noun else self.noun()
+        noun = noun or (self.plural(self.target_noun) if luck < 0.13 and self.target_noun else self.noun())
         if luck > 0.97:
             noun = self.random.choice(("wall", "floor", "ceiling", "corner", "ground"))
         phrase = self.noun_phrase(noun, depth, simple=simple)
@@ -187,7 +187,8 @@ class Speaker:
         name = self.weighted(relations.WEIGHTS)
         if self.chance(0.05) and name in ("near", "on", "under", "above", "front", "behind", "closest"):
             return self._twice(name)
-        text, thing = self.anchor(depth + 1)
+        built = name in relations.BUILT and self.chance(0.15)
+        text, thing = self.anchor(depth + 1, noun=self.random.choice(relations.BUILT[name]) if built else "")
         ordinal = 0
         said = self.pick(relations.PLACED[name]).format(text)
         if CONDITIONS[name].number == "may" and self.chance(0.05):

@@ -106,7 +106,7 @@ class Surroundings:
             noun = say.plural(say.target_noun) if say.chance(0.8) else say.target_noun
             anchor, thing = f"{'the ' if say.chance(0.85) else ''}{noun}", Thing(noun=noun)
         else:
-            anchor, thing = say.anchor(2)
+            anchor, thing = say.anchor(2, noun="door" if luck > 0.75 and say.chance(0.35) else "")
         first = say.chance(0.7)
         name, options = "looking", relations.LOOKING_FIRST if first else relations.LOOKING_LAST
         if luck > 0.75:

@@ -15,7 +15,7 @@ FURNITURE = _words(
     "sofa chair, loveseat, futon, bunk bed, crib, headboard, counter, kitchen counter, island, workbench, drawer, "
     "chest, "
     "drawers, cupboard, sideboard, tv stand, vanity, folding chair, rolling chair, recliner, bar stool, lounge chair, "
-    "conference table, round table, display case, locker, podium, lectern, cart, trolley, partition, divider, "
+    "conference table, display case, locker, podium, lectern, cart, trolley, partition, divider, "
     "bean bag, "
     "daybed, mattress, beanbag chair, rocking chair, high chair, foosball table, ping pong table, pool table, "
     "piano bench, "
@@ -75,7 +75,8 @@ RARE = _words(
     "surfboard, "
     "sword, tambourine, tapestry, telescope, terrarium, thermos, toolbox, totem, train set, trumpet, turntable, "
     "ukulele, urn, "
-    "wagon, walker, watering can, wheelchair, whistle, wind chime, wreath, xylophone, yarn, zipper, cubbies, wig, "
+    "wagon, walker, watering can, wheelchair, whistle, wind chime, looking glass, wreath, xylophone, yarn, "
+    "zipper, cubbies, wig, "
     "crutch"
 )
 ROOMS = _words(
@@ -83,10 +84,13 @@ ROOMS = _words(
     "study, "
     "basement, attic, guest room, kids room, master bedroom, playroom, lobby, conference room, classroom, library, "
     "gym, "
+    "lounge, hall, laundry, foyer, family room, sitting room, restroom, washroom, utility room, workshop, media room, "
+    "landing, cellar, kids bedroom, walk-in closet, spare room, waiting room, lab, studio, "
     "pantry, entrance hall, entryway, corridor, den, nursery, home office, meeting room, break room, mudroom, balcony"
 )
 AREAS = _words(
     "dining area, sitting area, seating area, work area, reading corner, sleeping area, cooking area, lounge area, "
+    "media area, play corner, dressing area, eating area, tv area, "
     "play area, entrance area, study area, washing area, storage area, reading area, bathing area, laundry area"
 )
 FLOORS = _words(

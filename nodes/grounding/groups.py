@@ -1,0 +1,49 @@
+"""Conditions on how a thing stands among its like: by itself, or one of so many.
+
+Source: METHOD section 10 ("groups"). Departs: a group is what hangs together by gaps, at any of a few gaps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from placegraph.nodes.grounding.boxes import F64, I64, Boxes
+from placegraph.nodes.grounding.relations import apart_m, gaps_m
+from placegraph.nodes.grounding.schema import Condition
+
+ALONE_M = 2.0  # departs: what has nothing like it within this is by itself; at half of it it may be
+GROUP_M = (0.3, 0.8, 1.5)  # departs: gaps that may still hold a group of things together
+UNKNOWN = 0.5  # of what is not among those compared
+
+
+def group_fits(boxes: Boxes, rows: I64, condition: Condition) -> tuple[F64, Callable[[int], str]]:
+    """(n,) fits of `alone` or `count`, compared among some rows, and a sentence for each."""
+    values = np.full(len(boxes), UNKNOWN)
+    peers = boxes.take(rows)
+    gap = apart_m(gaps_m(peers, peers))
+    if condition.name == "alone":
+        np.fill_diagonal(gap, np.inf)
+        told = gap.min(axis=1) if len(rows) > 1 else np.full(len(rows), ALONE_M)
+        farthest = max(float(told.max(initial=0.0)), 1e-6)
+        values[rows] = np.maximum(np.clip(told / ALONE_M, 0, 1), told / farthest)
+        text = "{}: the nearest of its kind is {:.2f} m away"
+    else:
+        sizes = [_group_sizes(gap, limit) for limit in GROUP_M]
+        fitting = np.any([size == condition.number for size in sizes], axis=0) | (len(rows) == condition.number)
+        values[rows] = np.where(fitting, 1.0, UNKNOWN)
+        text, told = "{} is in a group of {:.0f}", sizes[1]
+    words = {int(row): text.format(boxes.labels[row], value) for row, value in zip(rows, told, strict=True)}
+    return values, lambda i: words.get(i, "")
+
+
+def _group_sizes(gap: F64, limit: float) -> F64:
+    """(n,) how many hang together with each by gaps (n, n) up to a limit; itself counted."""
+    reach = (gap <= limit) | np.eye(len(gap), dtype=bool)
+    for _ in range(len(gap).bit_length()):
+        wider = (reach.astype(np.int32) @ reach.astype(np.int32)) > 0
+        if (wider == reach).all():
+            break
+        reach = wider
+    return np.asarray(reach.sum(axis=1), float)

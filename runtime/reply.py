@@ -1,0 +1,114 @@
+"""What askers receive (README, "Asking"): every reply, also one that says why there is no answer, fits `Reply`."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]  # metres, world frame
+Score = Annotated[float, Field(ge=0, le=1)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+
+class Step(_Part):
+    """One node of the path from the building to the object."""
+
+    id: str
+    layer: str
+    name: str
+
+
+class RankedObject(_Part):
+    """One candidate with its score and the sentences that say why."""
+
+    id: str
+    name: str
+    score: Score
+    evidence: list[str]
+
+
+class Stand(_Part):
+    """Where to stand before the object."""
+
+    position: Point
+    yaw_rad: float
+
+
+class View(_Part):
+    """Where left, right, front and behind were judged from."""
+
+    source: str
+    xyz: Point
+    heading_rad: float | None = None
+
+
+class Reply(_Part):
+    """The fields of a reply, always all of them. `Reply.model_json_schema()` is its JSON Schema."""
+
+    status: Literal["found", "not_in_map", "error"]
+    error: str | None  # the reason; null unless status is "error"
+    question_id: str
+    question: str
+    object_id: str | None
+    name: str | None
+    box: Annotated[list[Point], Field(min_length=2, max_length=2)] | None  # min and max
+    center: Point | None
+    path: list[Step]
+    approach: Stand | None
+    route: list[str]
+    travel_m: Annotated[float, Field(ge=0)] | None
+    evidence: list[str]
+    candidates: list[RankedObject]
+    parse: dict[str, Any] | str | None
+    sure: bool
+    viewpoint: View | None
+    revision: int  # of the graph that was asked; -1: there was none
+    llm_calls: Annotated[int, Field(ge=0)]
+    ms: Annotated[float, Field(ge=0)]  # from the request's arrival to its reply
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Reply:
+        """Raises ValueError when the fields contradict each other."""
+        found = self.status == "found"
+        if {found} != {value is not None for value in (self.object_id, self.name, self.box, self.center)}:
+            raise ValueError("object_id, name, box and center are given just when status is found")
+        if (self.status == "error") != bool(self.error):
+            raise ValueError("error says why just when status is error")
+        if not found and (self.path or self.candidates or self.route or self.approach):
+            raise ValueError("what was not found has no path, candidates, route or approach")
+        if found and (self.path[-1:] != [step for step in self.path if step.id == self.object_id]):
+            raise ValueError("the path ends at the object")
+        if found and self.object_id not in [one.id for one in self.candidates[:1]]:
+            raise ValueError("the object is the first candidate")
+        return self
+
+
+def finished(answer: dict[str, Any], ms: float) -> dict[str, Any]:
+    """A node's answer as the reply to its asker: with the time it took, which no node knows. ms: since it was asked."""
+    return {"error": None} | answer | {"ms": round(ms, 1)}
+
+
+def refusal(reason: str, question_id: str = "", text: str = "", ms: float = 0.0) -> dict[str, Any]:
+    """The fields of a reply that no node was asked for."""
+    return {
+        "status": "error",
+        "error": reason,
+        "question_id": question_id,
+        "question": text,
+        **dict.fromkeys(("object_id", "name", "box", "center", "approach", "travel_m", "parse", "viewpoint")),
+        **{field: [] for field in ("path", "route", "evidence", "candidates")},
+        "sure": False,
+        "revision": -1,
+        "llm_calls": 0,
+        "ms": round(ms, 1),
+    }
+
+
+def to_bytes(reply: dict[str, Any]) -> bytes:
+    """The JSON that is sent: UTF-8, sorted keys."""
+    return json.dumps(reply, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()

@@ -1,0 +1,115 @@
+"""`placegraph evaluate-grounding`: house questions with and without the parts of grounding, in one table."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from placegraph.runtime.errors import ConfigError
+from placegraph.tools.evaluate.ablations import VARIANTS, Asker, Scene, chosen_variants, house_scene, map_scene
+from placegraph.tools.evaluate.grounding import Reply, grounding_scores
+from placegraph.tools.evaluate.report import number, plain, table
+
+HEADS = ("exact id", "Acc@.1", "Acc@.25", "Acc@.5", "Acc@.75", "not in map", "errors", "ms p50", "ms p95", "calls")
+
+
+def evaluate_grounding(
+    maps: Annotated[list[Path] | None, typer.Argument(metavar="[MAP]...", help="Map folders.")] = None,
+    source: Annotated[
+        list[Path] | None, typer.Option(help="The house of each map, in the same order; its questions are asked.")
+    ] = None,
+    houses: Annotated[str, typer.Option(help="Instead: true graphs of houses, seeds A-B.")] = "",
+    count: Annotated[int, typer.Option(min=1, help="With --houses: questions about each.")] = 32,
+    variants: Annotated[
+        str, typer.Option(help=f"With and without what, of: {', '.join(VARIANTS)}.")
+    ] = "program,oracle,no relations,flat,rules",
+    forms: Annotated[bool, typer.Option("--forms", help="Also by form of question.")] = False,
+    wrong: Annotated[bool, typer.Option("--wrong", help="Print what the first variant answers wrong.")] = False,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of the language model.")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Ask questions of houses whose one right answer is known, of their true graphs or of maps of them."""
+    scenes = _scenes(maps or [], source or [], houses, count)
+    asker = Asker(threads)
+    found: dict[str, dict[str, Any]] = {}
+    for i, variant in enumerate(chosen_variants(variants)):
+        replies = [[asker.ask(variant, scene, asked) for asked in scene.questions] for scene in scenes]
+        found[variant] = variant_scores(scenes, replies)
+        if wrong and i == 0:
+            _print_wrong(scenes, replies)
+        print(f"{variant}: {found[variant]['all']['exact']:.3f}", file=sys.stderr, flush=True)
+    print(json.dumps(plain(found), sort_keys=True) if as_json else _text(found, forms))
+
+
+def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> list[Scene]:
+    if bool(maps) == bool(houses):
+        raise ConfigError("either MAP... with --source, or --houses must say of what is asked")
+    if len(maps) != len(source):
+        raise ConfigError(f"{len(maps)} maps and {len(source)} --source: one for each map, in the same order")
+    if maps:
+        return [map_scene(*one) for one in zip(maps, source, strict=True)]
+    first, _, last = houses.partition("-")
+    if not first.isdigit() or not (last or first).isdigit() or int(last or first) < int(first):
+        raise ConfigError(f"--houses {houses}: expected a seed or a range of seeds like 9000-9009")
+    return [house_scene(seed, count) for seed in range(int(first), int(last or first) + 1)]
+
+
+def variant_scores(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) -> dict[str, Any]:
+    """Scores of one variant in all and by form: of all scenes' questions together."""
+    asked = [(i, question) for i, scene in enumerate(scenes) for question in scene.questions]
+    boxes = {f"{i}/{node_id}": box for i, scene in enumerate(scenes) for node_id, box in scene.boxes.items()}
+    flat = [
+        Reply(one.status, f"{i}/{one.object_id}" if one.object_id else "", one.calls, one.ms)
+        for i, scene in enumerate(replies)
+        for one in scene
+    ]
+    scores = grounding_scores([question for _, question in asked], flat, boxes)
+    exact = np.array([reply.object_id == f"{i}/O{one.target}" for (i, one), reply in zip(asked, flat, strict=True)])
+    names = np.array([one.form for _, one in asked], object)
+    ms = np.array([reply.ms for reply in flat])
+    rows = [("", scores["all"])] + list(scores["forms"].items())
+    for form, row in rows:
+        mine = names == form if form else np.ones(len(names), bool)
+        row["exact"] = float(exact[mine].mean())
+        row["ms_p50"], row["ms_p95"] = (float(np.percentile(ms[mine], share)) for share in (50, 95))
+    return scores
+
+
+def _print_wrong(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) -> None:
+    for scene, given in zip(scenes, replies, strict=True):
+        for asked, reply in zip(scene.questions, given, strict=True):
+            if reply.object_id != f"O{asked.target}":
+                print(
+                    f"{scene.name} {asked.form}: {asked.text!r} -> {reply.object_id or reply.status}, O{asked.target}"
+                )
+
+
+def _text(found: dict[str, dict[str, Any]], forms: bool) -> str:
+    questions = next(iter(found.values()))["all"]["questions"]
+    rows = [[f"{questions} questions", *HEADS], *([name, *_cells(one["all"])] for name, one in found.items())]
+    parts = [table(rows)]
+    if forms:
+        names = list(next(iter(found.values()))["forms"])
+        counts = next(iter(found.values()))["forms"]
+        heads = ["exact id by form", "questions", *found]
+        body = [
+            [form, str(counts[form]["questions"]), *(number(one["forms"][form]["exact"]) for one in found.values())]
+            for form in names
+        ]
+        parts.append(table([heads, *body]))
+    return "\n\n".join(parts)
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    shares = [row["exact"], *(row[f"acc_{iou}"] for iou in ("0.1", "0.25", "0.5", "0.75"))]
+    times = [row["ms_p50"], row["ms_p95"]]
+    return [
+        *map(number, shares), str(row["not_in_map"]), str(row["errors"]), *(number(ms, 0) for ms in times),
+        number(row["calls"], 2),
+    ]  # fmt: skip
