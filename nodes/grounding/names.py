@@ -18,6 +18,7 @@ Encode = Callable[[Sequence[str]], NDArray[np.float32]]  # texts to (N, D) unit 
 
 # departs: the steps of fit, in the order people use names
 SAME, KIND, SYNONYM, SLIP, MEMBER, HEAD = 1.0, 0.95, 0.9, 0.88, 0.85, 0.8
+SHARED = 0.03  # departs: of synonyms the one whose word is in the noun is meant more
 COSINE = 0.45  # departs: lowest cosine that counts; see tests/nodes/grounding/test_names.py for the pairs it parts
 FAIR = 0.35  # departs: lowest cosine of a name that is taken, with doubt, where nothing is called so
 TAG_SHARE = 0.2  # departs: a tag with less than this share of the strongest tag's weight is a slip of the detector
@@ -145,7 +146,7 @@ def _by_words(noun: str, tag: str) -> float:
     if tag.endswith(f" {noun}"):
         return KIND  # an office chair is a chair
     if _are_synonyms(noun, tag):
-        return SYNONYM
+        return SYNONYM + SHARED * noun.endswith(f" {tag}")  # of a duffel bag: a bag before a backpack
     if tag in kinds().get(noun, ()):
         return MEMBER  # a chair is a seat
     if is_slip(noun, tag):
@@ -163,6 +164,8 @@ def _by_words(noun: str, tag: str) -> float:
                 found = max(found, worth * (SYNONYM if own != other else 0.9))
             elif other in kinds().get(own, ()):
                 found = max(found, worth * MEMBER)
+            elif is_slip(own, other):
+                found = max(found, worth * SLIP)
     return found
 
 

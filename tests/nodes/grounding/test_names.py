@@ -1,6 +1,6 @@
 import pytest
 
-from placegraph.nodes.grounding.names import COSINE, HEAD, KIND, SAME, SYNONYM
+from placegraph.nodes.grounding.names import COSINE, FAIR, HEAD, KIND, MEMBER, SAME, SHARED, SLIP, SYNONYM, is_slip
 
 
 def test_nothing_is_like_nothing(names):
@@ -13,7 +13,12 @@ def test_nothing_is_like_nothing(names):
 @pytest.mark.parametrize(
     ("noun", "tag", "score"),
     [("chairs", "Chair", SAME), ("chair", "office chair", KIND), ("couch", "sofa", SYNONYM), ("mug", "cup", SYNONYM),
-     ("wooden chair", "chair", HEAD), ("chair", "zebra", 0), ("mug", "rug", 0), ("glass", "window", 0),
+     ("wooden chair", "chair", HEAD), ("chair", "zebra", 0), 
+     ("duffel bag", "bag", SYNONYM + SHARED), ("duffel bag", "backpack", SYNONYM), ("trashcan", "trash can", SAME),
+    
+     ("dry erase board", "whiteboard", SYNONYM), ("seats", "armchair", MEMBER), ("bookshlef", "bookshelf", SLIP),
+     ("angel staute", "statue", HEAD * SLIP), ("leather couch", "sofa", HEAD * SYNONYM),
+     ("mug", "rug", 0), ("glass", "window", 0),
      ("table", "tablecloth", 0)],
 )  # fmt: skip
 def test_likeness(names, noun, tag, score):
@@ -58,3 +63,22 @@ def test_weak_second_tags_count_less_and_slips_not_at_all(names, thing_of):
 def test_nearest_names(names, house):
     assert names.nearest("carpet", house.layer("object"), 30)[0] != ""
     assert names.nearest("refrigerators", house.layer("object"))[0] == "fridge"
+
+
+@pytest.mark.parametrize(
+    ("noun", "word", "slip"),
+    [("curtian", "curtain", True), ("widnow", "window", True), ("wimdow", "window", True), ("desk", "dusk", False),
+     ("refridgerator", "refrigerator", True), ("lamp", "lamb", False), ("table", "cable", False),
+     ("shelf", "shell", False),
+     ("board", "boards", False), ("chairs", "chair", True), ("", "chair", False)],
+)  # fmt: skip
+def test_slips_of_spelling(noun, word, slip):
+    assert is_slip(noun, word) == slip
+
+
+def test_what_is_fairly_called_so_is_taken_where_nothing_is(names, house):
+    objects = house.layer("object")
+    fair = names.fair("sofas", objects)
+    assert {fit.node.name for fit in fair} == {"sofa"}
+    assert all(fit.score >= FAIR for fit in fair)
+    assert names.fair("zebra", objects) == names.fair("", objects) == names.fair("o3", objects) == []
