@@ -73,7 +73,7 @@ def variant_scores(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) 
     exact = np.array([reply.object_id == f"{i}/O{one.target}" for (i, one), reply in zip(asked, flat, strict=True)])
     names = np.array([one.form for _, one in asked], object)
     ms = np.array([reply.ms for reply in flat])
-    rows = [("", scores["all"])] + list(scores["forms"].items())
+    rows = [("", scores["all"]), *scores["forms"].items()]
     for form, row in rows:
         mine = names == form if form else np.ones(len(names), bool)
         row["exact"] = float(exact[mine].mean())
