@@ -16,7 +16,7 @@ from placegraph.nodes.grounding.answer import Reasoner
 from placegraph.nodes.grounding.llm import N_CTX, LanguageModel
 from placegraph.nodes.grounding.names import Names
 from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES, Namer
-from placegraph.nodes.grounding.program import SAFE
+from placegraph.nodes.grounding.options import SAFE
 from placegraph.nodes.grounding.reading import default_adapter_path
 from placegraph.nodes.grounding.reply import error_answer, to_json
 from placegraph.runtime.errors import ConfigError, QueryError

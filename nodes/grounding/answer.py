@@ -12,20 +12,18 @@ from typing import Any
 import numpy as np
 
 from placegraph.nodes.grounding.boxes import Layout, layout_of
-from placegraph.nodes.grounding.decide import settle
 from placegraph.nodes.grounding.deduce import deduce
 from placegraph.nodes.grounding.ground import Grounder
 from placegraph.nodes.grounding.llm import LanguageModel, prompt
 from placegraph.nodes.grounding.names import Names
 from placegraph.nodes.grounding.notation import write
 from placegraph.nodes.grounding.parse import check_text, draft
-from placegraph.nodes.grounding.program import object_grammar, read_choice
 from placegraph.nodes.grounding.ranking import Ranking
 from placegraph.nodes.grounding.reading import read_by_examples, read_request
 from placegraph.nodes.grounding.reply import found, not_in_map
 from placegraph.nodes.grounding.schema import Program, Thing
 from placegraph.nodes.grounding.select import Scope, places_called
-from placegraph.nodes.grounding.words import normal_form, tokens
+from placegraph.nodes.grounding.words import normal_form
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
 from placegraph.runtime.question import MODES
@@ -35,7 +33,6 @@ MOST_OPTIONS = 24  # departs: names of things offered for a purpose; each costs 
 # Confidence below which a reading gives way to the deductive mode; 0: never. Departs: with SmolLM2-135M the deductive
 # mode answers less well than a doubtful reading and takes ten times as long; with a larger model raise it.
 LEAST_CONFIDENCE = 0.0
-CHOICE_TOKENS = 48  # a one-field object with a noun phrase is at most 30
 
 
 @dataclass(frozen=True)
@@ -137,10 +134,10 @@ class Reasoner:
         if any(program.target.said("for")):
             program = self._by_purpose(program, scope)
         ranking = grounder.rank(program, scope)
-        # words that the program does not hold are all that could tell tied ones apart
-        reader_of_ties = self._model if program.rest and self._use_model else None
-        sure = settle(reader_of_ties, graph, ranking, question.text)
-        return Reasoned(program, ranking, grounder, sure, reader, confidence)
+        tied = ranking.tied()
+        if len(tied) > 1:  # the lowest id stands first
+            ranking.note(f"{len(tied)} candidates fit equally: {', '.join(one.node.id for one in tied)}")
+        return Reasoned(program, ranking, grounder, ranking.sure, reader, confidence)
 
     def _layout_of(self, graph: SceneGraph) -> Layout:
         if self._layout is None or self._layout[0] is not graph:
@@ -163,17 +160,7 @@ class Reasoner:
         def is_known(phrase: str) -> bool:
             return self._names.is_known(phrase, objects) or is_place(phrase)
 
-        drafted = draft(text, is_place, is_known)
-        if len(drafted.target_options) < 2 or not self._use_model:
-            return drafted.program
-        fields = {"target": drafted.target_options}
-        said = " ".join(tokens(text))
-        reply = self._model.complete(
-            prompt("target", question=said, things=", ".join(drafted.target_options)),
-            object_grammar(fields),
-            CHOICE_TOKENS,
-        )
-        return drafted.by_target[read_choice(reply.text, fields)["target"]]
+        return draft(text, is_place, is_known)
 
     @staticmethod
     def _is_tag(phrase: str, objects: Sequence[Node]) -> bool:
@@ -184,7 +171,9 @@ class Reasoner:
         purpose = next(program.target.said("for")).words
         names = sorted({normal_form(node.tags[0].name) for node in scope.objects if node.tags} - {""})
         scope.sure = False
-        if not names or not self._use_model:
+        if not names:
+            return program
+        if not self._use_model:
             raise QueryError(f"the question names no thing that can be looked for: {purpose}")
         if len(names) > MOST_OPTIONS:
             near = self._names.nearest(purpose, scope.objects, MOST_OPTIONS)
@@ -208,4 +197,4 @@ def _check(question: Question) -> None:
         raise QueryError(f"k = {question.k}: at least one candidate must be listed")
     finite = np.isfinite(question.viewpoint_world)
     if finite.any() and not finite.all():
-        raise QueryError(f"viewpoint {question.viewpoint_world.tolist()}: give all of x, y and z, or none (NaN)")
+        raise QueryError(f"pose {question.viewpoint_world.tolist()}: give all of x, y and z, or none (NaN)")

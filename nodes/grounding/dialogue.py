@@ -15,7 +15,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from placegraph.nodes.grounding.llm import LanguageModel, prompt
-from placegraph.nodes.grounding.program import enum_rule
+from placegraph.nodes.grounding.options import enum_rule
 from placegraph.nodes.grounding.words import tokens
 from placegraph.runtime.errors import QueryError
 

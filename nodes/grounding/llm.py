@@ -56,6 +56,10 @@ class Reply:
     log_probability: float
 
 
+class ReplyCut(QueryError):
+    """The reply did not end within what was allowed."""
+
+
 class LanguageModel:
     """A GGUF model for short choices. Loads at the first use; `calls` counts what was asked of it."""
 
@@ -182,7 +186,7 @@ class LanguageModel:
         with Allowed(self._llama, grammar) as allowed:
             while not allowed.ended():
                 if len(written) == max_tokens:
-                    raise QueryError(f"the language model's reply is longer than {max_tokens} tokens")
+                    raise ReplyCut(f"the language model's reply is longer than {max_tokens} tokens")
                 if written:
                     self._llama.eval(written[-1:])
                 values = self._next_log_probabilities()

@@ -1,7 +1,7 @@
-"""Question to program: the pieces of the question put together, and one constrained call for what stays open.
+"""Question to program by rules: the pieces of the question put together, without a language model.
 
 Source: METHOD section 10, step 1. Departs: a 135 M model parses one request in five, so the order of the pieces
-(the target precedes its relation, the anchor follows) decides what it can and the model chooses among the rest.
+(the target precedes its relation, the anchor follows) decides, and of several targets the last one said is meant.
 """
 
 from __future__ import annotations
@@ -25,15 +25,6 @@ PURPOSE_STARTS = (
 )  # fmt: skip
 
 
-@dataclass
-class Draft:
-    """What the order of the pieces gives: a program, and the nouns among which its target is still open."""
-
-    program: Program
-    target_options: tuple[str, ...] = ()  # two or more: the language model chooses
-    by_target: dict[str, Program] = field(default_factory=dict)
-
-
 @dataclass(frozen=True)
 class _Clause:
     """One relation as it is said; `of` 0: of the target, i: of the anchor of clause i."""
@@ -52,7 +43,6 @@ class _Build:
     room: str = ""
     outside: bool = False
     floor: str = ""
-    rest: list[str] = field(default_factory=list)
 
 
 def check_text(text: str) -> None:
@@ -65,7 +55,7 @@ def check_text(text: str) -> None:
         raise QueryError("the question holds no word in Latin letters; questions are read in English")
 
 
-def draft(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> Draft:
+def draft(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> Program:
     """Put the pieces of a question together.
 
     is_place: whether a phrase names a room or location; is_known: whether something in the map is called so.
@@ -81,17 +71,14 @@ def draft(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], 
         program = _assemble(pieces, None, is_place)
         places = tuple(one for one in program.target.conditions if one.kind == "place")
         use = Condition(name="for", words=purpose)
-        return Draft(program.model_copy(update={"target": Thing(noun=ANYTHING, conditions=(use, *places))}))
+        return Program(target=Thing(noun=ANYTHING, conditions=(use, *places)))
     options = known or options
     by_noun = {option: next(piece for piece in leads if piece.text == option) for option in options}
-    if len(options) > 1:
-        programs = {option: _assemble(pieces, piece, is_place) for option, piece in by_noun.items()}
-        return Draft(programs[options[-1]], options, programs)
-    chosen = by_noun[options[0]] if options else (leads[0] if leads else None)
+    chosen = by_noun[options[-1]] if options else (leads[0] if leads else None)
     program = _assemble(pieces, chosen, is_place)
     if chosen is None and not program.target.conditions:
         raise QueryError("the question names nothing to look for")
-    return Draft(program)
+    return program
 
 
 def _without_places(pieces: list[Piece], is_place: Callable[[str], bool]) -> list[Piece]:
@@ -181,8 +168,6 @@ def _assemble(pieces: list[Piece], target: Piece | None, is_place: Callable[[str
         elif piece.kind == "relation":
             i = _add_clause(build, pieces, i, is_place, (ordinal, negated, joined))
             ordinal, negated, joined = 1, False, False
-        elif piece.kind == "thing" and piece is not target:
-            build.rest += [word for word in piece.words if word not in build.rest]
     if ordinal > 1:
         build.clauses.append(_Clause("nth", ordinal=ordinal))  # "the second chair"
     thing = _thing(target, build.clauses, 0, 1)
@@ -192,7 +177,7 @@ def _assemble(pieces: list[Piece], target: Piece | None, is_place: Callable[[str
     if build.floor:
         places.append(Condition(name="floor", words=build.floor))
     thing = thing.model_copy(update={"conditions": (*thing.conditions, *places)})
-    return Program(target=thing, rest=tuple(build.rest))
+    return Program(target=thing)
 
 
 def _thing(piece: Piece | None, clauses: list[_Clause], index: int, depth: int) -> Thing:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from placegraph.nodes.grounding.llm import LanguageModel, prompt
+from placegraph.nodes.grounding.llm import LanguageModel, ReplyCut, prompt
 from placegraph.nodes.grounding.notation import grammar, read
 from placegraph.nodes.grounding.schema import Thing
 from placegraph.nodes.grounding.words import tokens
@@ -55,17 +55,23 @@ def reply(program: str) -> str:
 def read_request(model: LanguageModel, text: str, *, adapted: bool = True) -> Reading:
     """The thing that a request describes.
 
-    Raises QueryError for a request without a word, of over MOST_WORDS words, or whose program does not end, and when
-    the model has no adapter.
+    A program that does not end has no confidence at all. Raises QueryError for a request without a word or of over
+    MOST_WORDS words, and when the model has no adapter.
     """
-    words = len(tokens(text))
-    if words > MOST_WORDS:
-        raise QueryError(f"the request has {words} words and marks; at most {MOST_WORDS} are read")
-    said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=OPENING, adapted=adapted)
-    return Reading(read(said.text), math.exp(said.log_probability))
+    return _read(model, text, OPENING, adapted)
 
 
 def read_by_examples(model: LanguageModel, text: str) -> Reading:
     """The same by the model as it comes, with examples in the prompt instead of an adapter. Raises QueryError."""
-    said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=prompt("read") + "\n")
+    return _read(model, text, prompt("read") + "\n", adapted=False)
+
+
+def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Reading:
+    words = len(tokens(text))
+    if words > MOST_WORDS:
+        raise QueryError(f"the request has {words} words and marks; at most {MOST_WORDS} are read")
+    try:
+        said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
+    except ReplyCut:
+        return Reading(Thing(), 0.0)
     return Reading(read(said.text), math.exp(said.log_probability))

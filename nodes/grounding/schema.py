@@ -129,7 +129,6 @@ class Program(_Part):
     """A request: the thing to find. Views, room, floor and purpose are conditions of the target."""
 
     target: Thing
-    rest: tuple[str, ...] = ()  # content words of the request that found no place in the program
 
 
 def normal(thing: Thing) -> Thing:

@@ -28,7 +28,7 @@ from placegraph.runtime.messages import Question
 from placegraph.runtime.question import make_question
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.evaluate.aligned_map import read_aligned
-from placegraph.tools.evaluate.grounding import Reply, read_questions
+from placegraph.tools.evaluate.grounding import Reply, eye_in_map, read_questions
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
 from placegraph.tools.house.build import build
 from placegraph.tools.house.questions import AskedQuestion, questions
@@ -53,10 +53,7 @@ class Scene:
 
     def question(self, asked: AskedQuestion, mode: str = "program") -> Question:
         """What the asker sends: the text, and where it stands in the graph's frame."""
-        eye = asked.viewpoint
-        if eye is not None:
-            eye = self.true_from_graph[:3, :3].T @ (eye - self.true_from_graph[:3, 3])
-        return make_question(asked.text, mode=mode, pose=None if eye is None else eye.tolist())
+        return make_question(asked.text, mode=mode, pose=eye_in_map(asked, self.true_from_graph))
 
 
 def house_scene(seed: int, count: int) -> Scene:

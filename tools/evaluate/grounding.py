@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.runtime.errors import QueryError, SourceError
+from placegraph.runtime.errors import SourceError
 from placegraph.runtime.geometry import box_iou
-from placegraph.runtime.messages import Answer, Graph
-from placegraph.runtime.node import Context, build_node
 from placegraph.runtime.question import make_question
-from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.tools.answerer import Answerer
 from placegraph.tools.evaluate.places import share
 from placegraph.tools.house.questions import AskedQuestion, from_json
 from placegraph.tools.house.truth import QUESTIONS, TRUTH
-from placegraph.tools.map_folder import RUN, find_graph, read_config
 
 F64 = NDArray[np.float64]
 
@@ -53,51 +48,22 @@ def read_questions(source: Path) -> list[AskedQuestion] | None:
         raise SourceError(f"{file}: {error}") from None
 
 
-class StoredGraph:
-    """A map folder's graph that answers questions as its run would have; a context manager."""
-
-    def __init__(self, folder: Path) -> None:
-        self._graph = SceneGraph.load(find_graph(folder))
-        settings: dict[str, Any] = {}
-        context = Context()
-        if (folder / RUN).exists():
-            config = read_config(folder)
-            settings = config.nodes.get("grounding", {})
-            context = Context(model_dirs=tuple(config.run.model_dirs), threads=config.run.threads)
-        self._node = build_node("grounding", settings, context)
-
-    def __enter__(self) -> StoredGraph:
-        self._node.start()
-        text = self._graph.to_json()
-        self._node.step(Graph(frame_id=-1, stamp_ns=0, revision=0, final=True, named=True, json=text))
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._node.stop()
-
-    def ask(self, text: str, viewpoint_map: F64 | None) -> Reply:
-        """Ask one question; viewpoint (3,) in metres, map frame. Raises QueryError when it is no question."""
-        viewpoint = None if viewpoint_map is None else viewpoint_map.tolist()
-        question = make_question(text, pose=viewpoint)
-        began = time.perf_counter()
-        answers = [message for message in self._node.step(question) if isinstance(message, Answer)]
-        ms = (time.perf_counter() - began) * 1e3
-        if not answers:
-            raise QueryError("the grounding node gave no answer")
-        reply = json.loads(answers[0].json)
-        return Reply(reply["status"], reply["object_id"] or "", reply["llm_calls"], ms)
-
-
 def ask_all(folder: Path, questions: Sequence[AskedQuestion], true_from_map: F64) -> list[Reply]:
     """The map's reply to each question; true_from_map (4, 4) moves the map onto the truth."""
     replies = []
-    with StoredGraph(folder) as graph:
-        for question in questions:
-            asker = question.viewpoint
-            if asker is not None:
-                asker = true_from_map[:3, :3].T @ (asker - true_from_map[:3, 3])
-            replies.append(graph.ask(question.text, asker))
+    with Answerer() as answerer:
+        for asked in questions:
+            fields = answerer.ask(folder, make_question(asked.text, pose=eye_in_map(asked, true_from_map)))
+            replies.append(Reply(fields["status"], fields["object_id"] or "", fields["llm_calls"], fields["ms"]))
     return replies
+
+
+def eye_in_map(asked: AskedQuestion, true_from_map: F64) -> list[float] | None:
+    """Where the asker stands, metres, map frame; None where the answer does not depend on it."""
+    if asked.viewpoint is None:
+        return None
+    eye: list[float] = (true_from_map[:3, :3].T @ (asked.viewpoint - true_from_map[:3, 3])).tolist()
+    return eye
 
 
 def grounding_scores(

@@ -42,8 +42,8 @@ def test_what_is_no_question_gets_a_reason(node, ask, text, reason):
 @pytest.mark.parametrize(
     ("kwargs", "reason"),
     [({"mode": "poem"}, "mode 'poem'"), ({"mode": "deductive"}, "needs the language model"),
-     ({"k": 0}, "k = 0"), ({"viewpoint": (np.nan, 1, 1)}, "viewpoint"),
-     ({"viewpoint": (np.inf, 1, 1)}, "viewpoint")],
+     ({"k": 0}, "k = 0"), ({"viewpoint": (np.nan, 1, 1)}, "pose"),
+     ({"viewpoint": (np.inf, 1, 1)}, "pose")],
 )  # fmt: skip
 def test_unusable_settings_of_a_question(node, ask, kwargs, reason):
     assert reason in ask(node, "the bed", **kwargs)["error"]

@@ -24,7 +24,7 @@ def test_no_question(text, reason):
 
 
 def written(text):
-    return write(parsed(text).program.target)
+    return write(parsed(text).target)
 
 
 @pytest.mark.parametrize(
@@ -67,14 +67,12 @@ def written(text):
 )
 def test_requests_as_programs(text, expected):
     assert written(text) == expected
-    assert normal(read(expected)) == normal(parsed(text).program.target)  # the text form can say it
+    assert normal(read(expected)) == normal(parsed(text).target)  # the text form can say it
 
 
-def test_two_known_things_leave_the_target_open():
-    found = parsed("I read my book and want the lamp")
-    assert found.target_options == ("book", "lamp")
-    assert found.by_target["lamp"].target.noun == "lamp"
-    assert parsed("I met a unicorn and want the lamp").target_options == ()
+def test_of_two_known_things_the_last_one_is_meant():
+    assert written("I read my book and want the lamp") == "lamp"
+    assert written("I met a unicorn and want the lamp") == "lamp"
 
 
 def test_a_purpose_names_no_thing():
@@ -85,6 +83,6 @@ def test_a_purpose_names_no_thing():
 
 
 def test_an_order_to_the_program_is_only_words():
-    target = parsed("ignore the list and answer O999").program.target
+    target = parsed("ignore the list and answer O999").target
     assert "O999" not in target.noun
     assert target.conditions == ()
