@@ -113,11 +113,14 @@ def reader(
     seed: Annotated[int, typer.Option(min=0, help="Of the generated requests and the first weights.")] = 0,
     batch: Annotated[int, typer.Option(min=1, help="Requests a step.")] = 16,
     threads: Threads = 2,
+    model: Annotated[
+        Path | None, typer.Option(help="A GGUF of the family llama; without it the packaged model.")
+    ] = None,
 ) -> None:
     """Train the language model's adapter that reads requests into programs, on generated requests."""
     from placegraph.tools.train.reader import train_reader
 
-    train_reader(out, steps, seed=seed, batch=batch, threads=threads)
+    train_reader(out, steps, model_path=model, seed=seed, batch=batch, threads=threads)
 
 
 @app.command("evaluate-locations")

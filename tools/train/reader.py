@@ -50,10 +50,13 @@ class Sentences:
         return logits, torch.tensor([token for target in self.targets for token in target])
 
 
-def train_reader(out: Path, steps: int, *, seed: int = 0, batch: int = BATCH, threads: int = 2) -> None:
+def train_reader(
+    out: Path, steps: int, *, model_path: Path | None = None, seed: int = 0, batch: int = BATCH, threads: int = 2
+) -> None:
     """Train to `steps` and write the adapter to `out`, which is there from the first checkpoint on.
 
-    Goes on from the checkpoint beside `out` where there is one. Raises ConfigError for an unusable seed or file name.
+    model_path: a GGUF of the family llama; None for the packaged model. Goes on from the checkpoint beside `out` where
+    there is one. Raises ConfigError for an unusable seed or file name and ModelError for an unusable model.
     """
     if seed == VALIDATION_SEED:
         raise ConfigError(f"--seed: {seed} is set aside for validation")
@@ -62,8 +65,9 @@ def train_reader(out: Path, steps: int, *, seed: int = 0, batch: int = BATCH, th
     out.parent.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
-    model = LanguageModel()
-    network = ReaderNetwork(default_model_path())
+    model = LanguageModel(model_path)
+    model.load()
+    network = ReaderNetwork(model_path or default_model_path())
     held_out = examples(VALIDATION_SEED, 0, VALIDATION, held_out=True)
 
     def step(i: int) -> dict[str, Tensor]:

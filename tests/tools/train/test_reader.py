@@ -9,7 +9,7 @@ pytest.importorskip("gguf", reason="training needs the extra `train`")
 
 from placegraph.nodes.grounding.llm import LanguageModel  # noqa: E402
 from placegraph.nodes.grounding.reading import read_request  # noqa: E402
-from placegraph.runtime.errors import ConfigError  # noqa: E402
+from placegraph.runtime.errors import ConfigError, ModelError  # noqa: E402
 from placegraph.tools.train import reader  # noqa: E402
 from placegraph.tools.train.language import Example  # noqa: E402
 
@@ -61,6 +61,8 @@ def test_unusable_settings_are_named(tmp_path):
         reader.train_reader(tmp_path / "a.gguf", 1, seed=reader.VALIDATION_SEED)
     with pytest.raises(ConfigError, match=r"ends in \.gguf"):
         reader.train_reader(tmp_path / "a.bin", 1)
+    with pytest.raises(ModelError, match=r"none\.gguf: no such language model"):
+        reader.train_reader(tmp_path / "a.gguf", 1, model_path=tmp_path / "none.gguf")
 
 
 def test_a_run_learns_stops_and_goes_on(tmp_path, monkeypatch, capsys):
