@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.nodes.grounding.boxes import F64, Layout, layout_of
+from placegraph.nodes.grounding.boxes import F64, Boxes, Layout, layout_of
 from placegraph.nodes.grounding.conditions import NOT_THINGS, Conditions, says
 from placegraph.nodes.grounding.names import Fit, Names
 from placegraph.nodes.grounding.ranking import Candidate, Ranking
@@ -24,6 +24,7 @@ from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 MOST_LISTED = 50  # departs: candidates told with evidence; no request may ask for more (question.MAX_CANDIDATES)
 FAR_BETTER = 2.0  # departs: what holds by a hair does not go before what is so much better but for one condition
 FACED = 0.9  # departs: anchors of a view that fit nearly as well as the best vote on where it looks
+BESIDE_M, STOREY_M = 1.5, 2.0  # departs: who stands so near to one of several doors means that one
 DOORS = frozenset(
     ("enter", "entering", "entrance", "enters", "entry", "exit", "walk", "walking", "come", "coming", "in", "doorway",
      "walked", "entered", "step", "outside", "entryway")
@@ -86,6 +87,13 @@ class Grounder:
             self._list(ranking, thing, conditions.weigh(thing, conditions.boxes(fits), fits, thing), fits)
         return ranking
 
+    def _beside_asker(self, things: Boxes) -> Boxes:
+        """Of several things that one may stand at, those that the asker does stand at, if any."""
+        away = np.linalg.norm(things.center[:, :2] - self.asker_world[:2], axis=1)
+        level = np.abs(things.low[:, 2] - self.asker_world[2]) <= STOREY_M
+        here = np.flatnonzero((away <= BESIDE_M) & level)
+        return things.take(here) if len(here) else things
+
     def _conditions(self, scope: Scope, ranking: Ranking) -> Conditions:
         return Conditions(self.graph, self.names, self.layout, self.views, scope, ranking)
 
@@ -135,7 +143,7 @@ class Grounder:
             if found is None:
                 conditions.ranking.note(f"nothing in the map is called {inner.noun}, so nobody looks from there")
                 continue
-            best = found.best(level=FACED)
+            best = self._beside_asker(found.best(level=FACED))
             makers = {"from": self.views.at, "back": self.views.away, "looking": self.views.facing_most}
             self.views.said = makers[condition.name](best)
             conditions.forget()  # what was found before was seen from elsewhere

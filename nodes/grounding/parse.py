@@ -41,6 +41,7 @@ class _Build:
     target: Piece | None = None
     clauses: list[_Clause] = field(default_factory=list)
     room: str = ""
+    room_with: list[Piece] = field(default_factory=list)  # what tells the room: "the bedroom with the desk"
     outside: bool = False
     floor: str = ""
 
@@ -173,7 +174,8 @@ def _assemble(pieces: list[Piece], target: Piece | None, is_place: Callable[[str
     thing = _thing(target, build.clauses, 0, 1)
     places = []
     if build.room:
-        places.append(Condition(name="room", things=(Thing(noun=build.room),), negated=build.outside))
+        told = tuple(Condition(name="with", things=(_thing(one, [], 0, 1),)) for one in build.room_with)
+        places.append(Condition(name="room", things=(Thing(noun=build.room, conditions=told),), negated=build.outside))
     if build.floor:
         places.append(Condition(name="floor", words=build.floor))
     thing = thing.model_copy(update={"conditions": (*thing.conditions, *places)})
@@ -220,6 +222,13 @@ def _add_clause(
     if len(anchors) < least and relation.text not in ON_SPOT:
         return after  # a preposition that leads nowhere: "something to sit on", "over there"
     # without "and" or a comma, a relation belongs to the noun before it: the last anchor
+    if relation.text == "with" and i >= 2 and pieces[i - 2].kind in ("place", "thing") and build.room and not joined:
+        before = pieces[i - 2]
+        if before.kind == "place" or is_place(before.text):
+            build.room_with += anchors
+            return after
+    if CONDITIONS[relation.text].kind == "view":
+        joined = True
     of = 0 if joined or not build.clauses or not build.clauses[-1].anchors else len(build.clauses)
     if ordinal == 1 and most == 0 and not joined:
         of = 0

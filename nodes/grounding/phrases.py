@@ -40,10 +40,18 @@ FLOOR_KINDS = frozenset(("ground", "top", "upper", "lower", "lowest", "highest",
     ORDINALS
 )
 BREAKS = frozenset(",.;:?!")
+CANS = frozenset(("trash", "garbage", "waste", "recycling", "recycle", "rubbish", "watering"))  # what is a can
+VIEWS = {
+    tuple(phrase.split()): "from"
+    for phrase in ("seen from", "as seen from", "when seen from", "viewed from", "when viewed from", "looking from")
+}
 SIDES = {"left": "leftmost", "right": "rightmost", "middle": "middle"}
-IDIOMS = ("i left", "we left", "you left", "left my", "have left", "on it", "at home", "over there", "in here",
-          "turn on", "turned on", "which room", "what room", "which floor", "what floor", "take a look at", "look at",
-          "what color", "next time", "is left", "in order", "so that", "by the way", "go to")  # fmt: skip
+IDIOMS = (
+    "i left", "we left", "you left", "left my", "have left", "on it", "at home",
+    "over there", "in here", "turn on", "turned on", "which room", "what room", "which floor",
+    "what floor", "take a look at", "look at", "what color", "next time", "is left", "in order",
+    "so that", "by the way", "go to", "from where i stand", "from where i am", "from here",
+)  # fmt: skip
 
 # Only these are taken off a noun: a "low table" and a "high chair" are things of their own.
 SIZES = {"big": "large", "large": "large", "huge": "large", "small": "small", "little": "small", "tiny": "small"}
@@ -83,7 +91,7 @@ def turned(text: str) -> str:
 def cut(text: str) -> list[Piece]:
     """Cut a question into pieces; filler words vanish but end a noun phrase."""
     words, pieces, i = tokens(turned(text)), [], 0
-    phrases = triggers()
+    phrases = triggers() | VIEWS
     longest = max(map(len, phrases))
     idioms = [tuple(idiom.split()) for idiom in IDIOMS]
     pending: list[str] = []
@@ -135,6 +143,8 @@ def _single(word: str, following: str, pending: list[str], pieces: list[Piece], 
     elif word in ("to", "from"):
         flush()
         pieces.append(Piece("to"))
+    elif word == "can" and pending and pending[-1] in CANS:
+        pending.append(word)
     elif word in FILLER:
         flush()
     else:

@@ -6,7 +6,7 @@ before it, so that the line of sight is one of its axes; and a thing with a fron
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from placegraph.nodes.grounding.boxes import F64, Boxes, Layout
 WALL_M = 0.5  # departs: what stands so close to a wall has its back to it
 ELONGATED = 1.4  # departs: from this ratio of its sides on, a thing has a broad side that people face
 LONG_FACED = ("bed", "couch bed", "bunk bed", "bathtub", "crib")  # faced along their long side, from the foot
+AT_ROOM_M = 1.5  # departs: what one may stand at belongs to a room within this, through its wall
 MIDDLE_TRUST = 0.5  # departs: nobody said where the viewer is; the room's centre is right more often than not
 SAME_WAY = 0.9  # departs: cosine of lines of sight that look at the same wall
 HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before the bed
@@ -76,7 +77,7 @@ class Views:
             forward = anchors.center[:, :2] - eye
             if view is self.said and view.forward is not None:
                 forward = np.tile(view.forward, (len(anchors), 1))
-            sources, trust = [one.source for one in views], np.full(len(anchors), view.trust)
+            sources, trust = [one.source for one in views], np.array([one.trust for one in views], float)
         else:
             for j in range(len(anchors)):
                 if np.isfinite(anchors.front[j]).all():
@@ -163,16 +164,19 @@ class Views:
         return View(views[0].source, views[0].eye, others=tuple(views))
 
     def _of_room(self, view: View, room: int) -> View:
-        """Of the views from several things the one nearest to a room; of one view itself."""
-        if len(view.others) < 2:
+        """Of the places that one may stand at the one of a room; of a view that is not from a place itself.
+
+        Where none of them is at the room (not every doorway has a door) the asker's view, or a doubtful one.
+        """
+        if not view.others:
             return view
-        low, high = self.layout.room_low[room, :2], self.layout.room_high[room, :2]
-        z = self.layout.room_low[room, 2]
-        away = [
-            float(np.linalg.norm([*np.maximum(np.maximum(low - one.eye, one.eye - high), 0), z - one.z_m]))
-            for one in view.others
-        ]
-        return view.others[int(np.argmin(away))]
+        low, high = self.layout.room_low[room], self.layout.room_high[room]
+        places = np.array([[*one.eye, one.z_m] for one in view.others])
+        away = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0), axis=1)
+        nearest = view.others[int(np.argmin(away))]
+        if away.min() <= AT_ROOM_M:
+            return nearest
+        return self.asker or replace(nearest, trust=MIDDLE_TRUST)
 
 
 def _unit(vectors: F64) -> F64:

@@ -49,6 +49,11 @@ def judge(case: Case) -> Fits:
         gap = apart_m(gaps_m(targets, case.hint)).min(axis=1)
         return Fits(-gap[:, None], lambda i, _: f"{targets.labels[i]} is {gap[i]:.2f} m from there", MARGIN_M)
     view = case.views.over(targets, case.hint)
+    if case.relation == "nth" and case.views.said is not None and case.views.said.forward is None:
+        # the first bed as one comes in: of those who stand at a place, the nearest comes first
+        away = np.linalg.norm(targets.center[:, :2] - view.eye, axis=1)
+        told = f"m from the {view.source}"
+        return Fits(-away[:, None], lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {told}", MARGIN_M)
     if case.relation in ("frontmost", "backmost"):
         if view.source == "room centre":
             view = _entrance_view(case) or view

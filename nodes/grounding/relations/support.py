@@ -23,6 +23,7 @@ CONTACT_M = 0.15  # departs: gap between what lies and what carries it, at which
 STANDS_SHARE = 0.5  # departs: what stands in the upper half of a box stands on it: a bed's box includes its headboard
 HANGS_M, HANGS_SHARE = 0.1, 0.7  # departs: what touches an upright thing, off its bottom, hangs on it ("on the wall")
 WITHIN_SHARE, ON_SHARE = 0.8, 0.9  # departs: how well what is inside is "on", and what is on top is "in"
+FLOOR_M = 0.1  # departs: the floor of a room's box is as low as the lowest thing in it
 SPOT_M, CORNER_M = 0.02, 0.8  # departs: "in the corner": a corner or middle of a room is no box that holds things
 OFF_GROUND_M = 0.3
 WALL_M = 0.4  # departs: room boxes end inside the wall or beyond it
@@ -92,11 +93,10 @@ def judge(case: Case) -> Fits:
     if name == "on":
         # "on" is said of a cup in a cupboard's box too: shelves, racks, counters with a wall behind
         values = np.maximum(on_fit(targets, anchors, gaps), WITHIN_SHARE * in_fit(targets, anchors, gaps))
-        walls = np.array([not one for one in anchors.ids], bool) & (anchors.size[:, 2] > 1.0)
-        off = targets.low[:, None, 2] - anchors.low[None, :, 2] > OFF_GROUND_M
-        values = np.where(walls[None], HANGS_SHARE * halving(flat_m(gaps), WALL_M) * off, values)
+        values = _on_shells(targets, anchors, gaps, values)
     elif name == "in":
         values = np.maximum(in_fit(targets, anchors, gaps), ON_SHARE * on_fit(targets, anchors, gaps))
+        values = _on_shells(targets, anchors, gaps, values)
     elif name == "under":
         values = under_fit(targets, anchors, gaps)
     elif name == "above":
@@ -106,10 +106,20 @@ def judge(case: Case) -> Fits:
         if name == "with":
             gap = apart_m(gaps)
             values = np.maximum(values, np.maximum(0.9 * halving(gap, PART_M), 0.7 * halving(gap, BESIDE_M)))
-    spots = np.array([not one for one in anchors.ids], bool) & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
-    if name in ("in", "on"):
-        values = np.where(spots[None], halving(flat_m(gaps), CORNER_M), values)
     return Fits(values, lambda i, j: _sentence(case, i, j))
+
+
+def _on_shells(targets: Boxes, anchors: Boxes, gaps: F64, values: F64) -> F64:
+    """The fits (n, m) of "on" and "in" with those of walls, floors and corners that no map holds as objects."""
+    shell = np.array([not one for one in anchors.ids], bool)
+    wall, floor = shell & (anchors.size[:, 2] > 1.0), shell & (anchors.size[:, 2] <= FLOOR_M)
+    spot = shell & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
+    flat = flat_m(gaps)
+    off = targets.low[:, None, 2] - anchors.low[None, :, 2] > OFF_GROUND_M
+    above = targets.low[:, None, 2] - anchors.high[None, :, 2] - FLOOR_M
+    values = np.where(wall[None], HANGS_SHARE * halving(flat, WALL_M) * off, values)
+    values = np.where(floor[None], halving(above, CONTACT_M) * (flat <= 0), values)
+    return np.where(spot[None], halving(flat, CORNER_M), values)
 
 
 def _carries(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:

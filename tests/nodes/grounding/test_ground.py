@@ -113,6 +113,18 @@ def test_viewpoint_is_said_or_the_askers_or_the_room(names, house):
     assert grounder.viewpoint(house.nodes["O9"]).source == "tv O10"
 
 
+def test_of_several_doors_the_one_that_the_asker_stands_at_is_meant(names, room_of):
+    doors = ("door", (0, 2, 1), (0.1, 0.9, 2)), ("door", (6, 2, 1), (0.1, 0.9, 2))
+    graph = room_of(*doors, ("box", (3, 1, 0.2), (0.4, 0.4, 0.4)), ("box", (3, 3, 0.2), (0.4, 0.4, 0.4)))
+    for x, expected in ((0.3, "O3"), (5.7, "O2")):
+        assert best(graph, names, "box; leftmost; from (door)", asker=np.array([x, 2.0, 1.5])) == expected
+
+
+def test_the_first_as_one_comes_in_is_the_nearest(names, house):
+    assert best(house, names, "vase; nth 1; from (tv); floor (downstairs)") == "O24"
+    assert best(house, names, "vase; nth 2; from (tv); floor (downstairs)") == "O13"
+
+
 def test_the_askers_heading_turns_a_row(names, house):
     asker = np.array([2.0, 2.0, 1.5])
     for heading, expected in ((np.pi / 2, "O3"), (-np.pi / 2, "O4")):

@@ -62,6 +62,10 @@ def written(text):
         ("the lamp in the living room on the second floor", "lamp; room (living room); floor (second floor)"),
         ("the book from the bedroom", "book; room (bedroom)"),
         ("go to the kitchen", "kitchen"),
+        ("the cup in the bedroom with the window", "cup; room (bedroom; with (window))"),
+        ("the left lamp as seen from the window", "lamp; leftmost; from (window)"),
+        ("the leftmost lamp from where I stand", "lamp; leftmost"),
+        ("the trash can near the bed", "trash can; near (bed)"),
         ("the lamp that is not in the bedroom", "lamp; not room (bedroom)"),
     ],
 )

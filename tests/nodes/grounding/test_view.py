@@ -67,6 +67,16 @@ def test_of_several_doors_each_room_has_its_own(house):
     assert views.toward(things).sources == ("window O8", "window O14", "window O20")
 
 
+def test_a_room_without_a_door_of_its_own_is_seen_by_the_asker(house):
+    layout = layout_of(house)
+    bed = layout.all.take([layout.row["O15"]])
+    for asker, source, trust in ((NOBODY, "sofa O9", 0.5), (np.array([1.0, 1, 4]), "asker", 1.0)):
+        views = Views(layout, asker)
+        views.said = views.at(layout.all.take([layout.row["O9"]]))
+        lines = views.toward(bed)  # the sofa is downstairs in another room
+        assert (lines.sources, lines.trust.tolist()) == ((source,), [trust])
+
+
 def test_nothing_is_seen_without_error(layout):
     views = Views(layout, NOBODY)
     nothing = layout.all.take([])
