@@ -12,7 +12,7 @@ from pathlib import Path
 
 from placegraph.nodes.grounding.llm import LanguageModel, ReplyCut, prompt
 from placegraph.nodes.grounding.notation import grammar, read
-from placegraph.nodes.grounding.schema import Thing
+from placegraph.nodes.grounding.schema import SAME_KIND, Thing
 from placegraph.nodes.grounding.words import tokens
 from placegraph.runtime.errors import ModelError, QueryError
 
@@ -74,4 +74,12 @@ def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Readi
         said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
     except ReplyCut:
         return Reading(Thing(), 0.0)
-    return Reading(read(said.text), math.exp(said.log_probability))
+    return Reading(with_noun(read(said.text)), math.exp(said.log_probability))
+
+
+def with_noun(thing: Thing) -> Thing:
+    """A target that is called "one" gets the noun of what is looked at: "facing the lamps, the one on the left"."""
+    faced = next(thing.said("looking"), None)
+    if thing.noun != SAME_KIND or faced is None or faced.things[0].noun == SAME_KIND:
+        return thing
+    return thing.model_copy(update={"noun": faced.things[0].noun})

@@ -3,13 +3,14 @@
 import pytest
 
 from placegraph.nodes.grounding.llm import LanguageModel
-from placegraph.nodes.grounding.notation import read
+from placegraph.nodes.grounding.notation import read, write
 from placegraph.nodes.grounding.reading import (
     MOST_WORDS,
     OPENING,
     asked,
     default_adapter_path,
     read_request,
+    with_noun,
 )
 from placegraph.nodes.grounding.schema import normal
 from placegraph.runtime.errors import QueryError
@@ -80,3 +81,9 @@ def test_a_request_that_is_too_long_is_refused(model):
 def test_a_model_without_an_adapter_reads_nothing():
     with pytest.raises(QueryError, match="has no adapter"):
         read_request(LanguageModel(), "the lamp")
+
+
+def test_one_is_of_the_kind_that_is_looked_at():
+    assert write(with_noun(read("one; looking (lamps; count 2); leftmost"))).startswith("lamps; looking (lamps")
+    for text in ("one; near (door)", "chair; looking (lamps)", "one; looking (one; is red)"):
+        assert write(with_noun(read(text))) == text
