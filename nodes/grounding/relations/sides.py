@@ -15,6 +15,7 @@ from placegraph.nodes.grounding.relations import Case, Fits, Relation, apart_m, 
 
 MARGIN_M = 0.1  # departs: about the error of a box centre from a depth camera
 SIDE_SHARE = 0.26  # departs: within 15 degrees of the line of sight nothing is left or right: there the fit is a half
+WITHIN = 0.1  # departs: how much what is within an anchor's width counts towards its side
 SIDE_M, FRONT_M = 3.0, 1.5  # departs: "left of the sofa" means beside it, not anywhere in that half of the room
 MILD = 0.75  # departs: how well what is close by on the other side is "in front", when nobody said who looks
 ACROSS_M = 0.8  # departs: what is nearer is beside, not across
@@ -36,11 +37,11 @@ def judge(case: Case) -> Fits:
     blind = np.asarray(~lines.forward.any(axis=1))
     if case.relation in ("left", "right"):
         main = left if case.relation == "left" else -left
-        share = _share(main, np.maximum(np.abs(ahead) - deep, 0))
+        share = _share(main, wide, np.abs(ahead) - deep)
         values = np.where(blind, 0.5, share) * halving(gap, SIDE_M)
     elif case.relation in ("front", "behind"):
         main = ahead if case.relation == "behind" else -ahead
-        share = _share(main, np.maximum(np.abs(left) - wide, 0))
+        share = _share(main, deep, np.abs(left) - wide)
         unsaid = lines.trust < 1
         mild = MILD + (1 - MILD) * share
         values = np.where(unsaid | blind, np.where(blind, MILD, mild), share) * halving(gap, FRONT_M)
@@ -64,9 +65,14 @@ def judge(case: Case) -> Fits:
     return Fits(values, sentence, trust=trust, view=lines.sources[0] if len(anchors) else "")
 
 
-def _share(main: F64, cross: F64) -> F64:
-    """Fit 0..1 of a direction: 1 from 45 degrees on, a half at 15, none on the other side."""
-    share = main / np.maximum(np.hypot(main, cross), 1e-9)
+def _share(main: F64, half: F64, cross: F64) -> F64:
+    """Fit 0..1 of a direction: 1 from 45 degrees on, a half at 15, none on the other side.
+
+    main (n, m): metres that way from the anchor's middle, half (m,) of them within it; cross (n, m): metres beyond its
+    edge to the other way: what stands before the left end of a sofa is before it, and hardly to its left.
+    """
+    beyond = np.maximum(main - half, 0) + WITHIN * np.maximum(main, 0)
+    share = np.where(main > 0, beyond / np.maximum(np.hypot(beyond, np.maximum(cross, 0)), 1e-9), -1.0)
     fit = np.clip(0.5 + (share - SIDE_SHARE) * 0.5 / (DEGREES_45 - SIDE_SHARE), 0.0, 1.0)
     return np.asarray(fit * np.clip(main / MARGIN_M - 0.5, 0, 1))
 

@@ -291,6 +291,13 @@ def test_damaged_questions_are_named(name: str, value: object) -> None:
         from_json([{key: good[key] for key in good if key != name}])
 
 
+def test_files_from_before_there_were_programs_are_read() -> None:
+    value = to_json(asked_of(0)[:1])[0]
+    assert value["program"] == asked_of(0)[0].program != ""
+    del value["program"]
+    assert from_json([value])[0].program == ""
+
+
 def test_edges_of_count() -> None:
     house = one_room(thing("piano", 2, 2))
     assert [one.form for one in questions(house, 0)] == ["unique"]

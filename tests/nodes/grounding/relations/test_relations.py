@@ -188,3 +188,9 @@ def test_what_faces_is_known_of_things_with_a_front_only(cube):
 def test_what_lies_on_something_is_told_from_its_top(cube, height, words):
     fits = judge("on", [cube(1, (0, 0, height))], [cube(0, (0, 0, 0))])
     assert fits.sentence(0, 0).startswith(f"the bottom of cube O1 is {words} of cube O0")
+
+
+def test_what_stands_before_the_end_of_a_wide_thing_is_before_it_and_not_beside(cube):
+    sofa, before, beside = cube(1, (0, 0, 0), (2.4, 0.8, 0.8)), cube(0, (-1.0, -0.8, 0)), cube(2, (-2.0, -0.1, 0))
+    left, front = (judge(name, [before, beside], [sofa]).values[:, 0] for name in ("left", "front"))
+    assert (left.argmax(), front.argmax()) == (1, 0)
