@@ -14,7 +14,16 @@ from collections.abc import Sequence
 
 from pydantic import ValidationError
 
-from placegraph.nodes.grounding.schema import ANYTHING, CONDITIONS, MOST_DEPTH, SAME_KIND, Condition, Form, Thing
+from placegraph.nodes.grounding.schema import (
+    ANYTHING,
+    CONDITIONS,
+    MOST_CONDITIONS,
+    MOST_DEPTH,
+    SAME_KIND,
+    Condition,
+    Form,
+    Thing,
+)
 from placegraph.nodes.grounding.words import tokens
 from placegraph.runtime.errors import QueryError
 
@@ -139,7 +148,7 @@ def grammar(text: str) -> str:
         *spans,
     ]
     for depth in range(1, MOST_DEPTH + 1):
-        rules.append(f't{depth} ::= noun ("; " ("not ")? c{depth})*')
+        rules.append(f't{depth} ::= noun ("; " ("not ")? c{depth}){{0,{MOST_CONDITIONS}}}')
         names = [name for name in CONDITIONS if depth == 1 or CONDITIONS[name].kind not in ("view", "purpose")]
         options = [_rule(name, CONDITIONS[name], depth) for name in names]
         rules.append(f"c{depth} ::= {' | '.join(option for option in options if option)}")

@@ -43,6 +43,7 @@ class Scene:
     """A graph, the questions about it, and how its frame lies in that of the questions.
 
     true_from_graph: (4, 4) rigid transform. boxes: (2, 3) of each object by id, in the frame of the questions.
+    true_ids: whether O<number> is the item of that number, as in a true graph.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Scene:
     questions: Sequence[AskedQuestion]
     true_from_graph: F64
     boxes: Mapping[str, F64]
+    true_ids: bool = False
 
     def question(self, asked: AskedQuestion, mode: str = "program") -> Question:
         """What the asker sends: the text, and where it stands in the graph's frame."""
@@ -61,7 +63,7 @@ def house_scene(seed: int, count: int) -> Scene:
     house = build(seed)
     graph = true_graph(house)
     boxes = {node.id: node.box for node in graph.layer("object")}
-    return Scene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes)
+    return Scene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes, true_ids=True)
 
 
 def map_scene(folder: Path, source: Path) -> Scene:

@@ -43,8 +43,10 @@ def evaluate_grounding(
         found[variant] = variant_scores(scenes, replies)
         if wrong and i == 0:
             _print_wrong(scenes, replies)
-        print(f"{variant}: {found[variant]['all']['exact']:.3f}", file=sys.stderr, flush=True)
-    print(json.dumps(plain(found), sort_keys=True) if as_json else _text(found, forms))
+        print(f"{variant}: Acc@.25 {found[variant]['all']['acc_0.25']:.3f}", file=sys.stderr, flush=True)
+    print(
+        json.dumps(plain(found), sort_keys=True) if as_json else _text(found, forms, "exact" if houses else "acc_0.25")
+    )
 
 
 def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> list[Scene]:
@@ -76,7 +78,7 @@ def variant_scores(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) 
     rows = [("", scores["all"]), *scores["forms"].items()]
     for form, row in rows:
         mine = names == form if form else np.ones(len(names), bool)
-        row["exact"] = float(exact[mine].mean())
+        row["exact"] = float(exact[mine].mean()) if all(scene.true_ids for scene in scenes) else float("nan")
         row["ms_p50"], row["ms_p95"] = (float(np.percentile(ms[mine], share)) for share in (50, 95))
     return scores
 
@@ -90,16 +92,16 @@ def _print_wrong(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) ->
                 )
 
 
-def _text(found: dict[str, dict[str, Any]], forms: bool) -> str:
+def _text(found: dict[str, dict[str, Any]], forms: bool, measure: str) -> str:
     questions = next(iter(found.values()))["all"]["questions"]
     rows = [[f"{questions} questions", *HEADS], *([name, *_cells(one["all"])] for name, one in found.items())]
     parts = [table(rows)]
     if forms:
         names = list(next(iter(found.values()))["forms"])
         counts = next(iter(found.values()))["forms"]
-        heads = ["exact id by form", "questions", *found]
+        heads = [f"{measure} by form", "questions", *found]
         body = [
-            [form, str(counts[form]["questions"]), *(number(one["forms"][form]["exact"]) for one in found.values())]
+            [form, str(counts[form]["questions"]), *(number(one["forms"][form][measure]) for one in found.values())]
             for form in names
         ]
         parts.append(table([heads, *body]))
