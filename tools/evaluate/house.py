@@ -15,6 +15,7 @@ from placegraph.tools.evaluate.aligned_map import read_aligned
 from placegraph.tools.evaluate.connections import connection_scores
 from placegraph.tools.evaluate.grounding import ask_all, grounding_scores, read_questions
 from placegraph.tools.evaluate.known import Known, KnownFloor, KnownObject, KnownPlace, Sight, Words
+from placegraph.tools.evaluate.place_names import place_name_scores
 from placegraph.tools.evaluate.scores import map_scores
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
 from placegraph.tools.house.classes import CLASSES
@@ -41,8 +42,9 @@ def house_scores(folder: Path, source: Path, given: Mapping[int, F64] | None, qu
     aligned = read_aligned(folder, true_from_map)
     known = known_of(truth, truth.seen, true)
     found = map_scores(aligned, known)
+    graph = SceneGraph.load(find_graph(folder))
+    found["place_names"] = place_name_scores(graph, aligned, truth)
     if truth.connections is not None:
-        graph = SceneGraph.load(find_graph(folder))
         rooms = zip(truth.rooms, known.rooms or (), strict=True)
         seen = frozenset(one.id for one, shown in rooms if shown.seen)
         found["connections"] = connection_scores(graph, true_from_map, truth, seen)

@@ -51,6 +51,7 @@ COLUMNS = (  # of a table of maps: head, where the number stands, its factor, di
     ("obj R", ("objects", "recall"), 1, 3),
     ("obj IoU", ("objects", "mean_iou"), 1, 3),
     ("per found", ("objects", "map_per_found"), 1, 2),
+    ("room names", ("place_names", "rooms", "top_1"), 1, 2),
     ("AUC", ("objects", "top_k", "auc"), 1, 3),
 )
 
@@ -89,6 +90,8 @@ def map_text(scores: Mapping[str, Any], per_class: bool) -> str:
         lines += [f"{layer:<10} not in the truth: not scored" for layer in absent]
         if "ate_rmse_m" not in scores:
             lines.append("trajectory not in the truth: not scored; both frames are taken as equal")
+    if "place_names" in scores:
+        lines += [_place_names(layer, one) for layer, one in scores["place_names"].items()]
     if "connections" in scores:
         lines += _connections(scores["connections"])
     if per_class and "objects" in scores:
@@ -96,6 +99,11 @@ def map_text(scores: Mapping[str, Any], per_class: bool) -> str:
     if "questions" in scores:
         lines += ["", _questions(scores["questions"])]
     return "\n".join(lines)
+
+
+def _place_names(layer: str, one: Mapping[str, Any]) -> str:
+    right = f"first name {number(one['top_1'])}, one of three {number(one['top_3'])}"
+    return f"names of {layer}: {right}, of {one['judged']} that lie in one true place"
 
 
 def _trajectory(scores: Mapping[str, Any]) -> str:
