@@ -14,10 +14,13 @@ from placegraph.nodes.grounding.boxes import F64, Boxes, Layout
 
 WALL_M = 0.5  # departs: what stands so close to a wall has its back to it
 ELONGATED = 1.4  # departs: from this ratio of its sides on, a thing has a broad side that people face
+LONG_ENOUGH = 1.1  # departs: the same for beds, which have a foot however wide they are
 LONG_FACED = ("bed", "couch bed", "bunk bed", "bathtub", "crib")  # faced along their long side, from the foot
 AT_ROOM_M = 1.5  # departs: what one may stand at belongs to a room within this, through its wall
 MIDDLE_TRUST = 0.5  # departs: nobody said where the viewer is; the room's centre is right more often than not
 SAME_WAY = 0.9  # departs: cosine of lines of sight that look at the same wall
+ROW_RATIO = 3.0  # departs: as long to wide as things must lie to be a row that people stand before
+ROW_ASIDE_M = 0.3  # departs: a row through the room's middle has no side on which one stands
 HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before the bed
 
 
@@ -129,7 +132,7 @@ class Views:
         steps = np.where(np.abs(directions) > 0.3, edge / np.where(np.abs(directions) > 0.3, directions, 1), np.inf)
         free = steps.min(axis=1) - half
         is_long_faced = things.labels[j].rsplit(" ", 1)[0] in LONG_FACED
-        broad = (long if is_long_faced else ~long) * (ratio >= ELONGATED)
+        broad = (long if is_long_faced else ~long) * (ratio >= (LONG_ENOUGH if is_long_faced else ELONGATED))
         if not broad.any() and (free > WALL_M).all():
             return way / length if length > 0.05 else np.zeros(2)
         score = directions @ (way / length) if length > 0.05 else np.zeros(4)
@@ -147,11 +150,29 @@ class Views:
 
     def facing_most(self, things: Boxes) -> View:
         """The view of one who looks at several things: towards the wall that most of them are on ("the windows")."""
+        row = self._row(things)
+        if row is not None:
+            return row
         ways = [self.facing(things.take([j])) for j in range(len(things))]
         sights = [way.forward for way in ways if way.forward is not None]
         votes = [sum(float(way.forward @ other) > SAME_WAY for other in sights) if way.forward is not None else 0
                  for way in ways]  # fmt: skip
         return ways[int(np.argmax(votes))]
+
+    def _row(self, things: Boxes) -> View | None:
+        """The view of one who has a row of things of one room before him, across it; None where they are none."""
+        if len(things) < 2 or len(set(things.room.tolist())) > 1:
+            return None
+        centers = things.center[:, :2]
+        spread, axes = np.linalg.eigh(np.cov(centers.T))
+        if np.sqrt(spread[1]) < ROW_RATIO * np.sqrt(max(spread[0], 0.0)) or spread[1] < 1e-6:
+            return None
+        middle, room = centers.mean(axis=0), self.layout.room_center(things.room[:1])[0]
+        across = float((middle - room) @ axes[:, 0])
+        if abs(across) < ROW_ASIDE_M:
+            return None
+        forward = axes[:, 0] * np.sign(across)
+        return View(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
 
     def away(self, things: Boxes) -> View:
         """The view of one who has the first of some things behind."""

@@ -24,6 +24,10 @@ def judge(case: Case) -> Fits:
     offset = case.targets.center[:, None, :2] - a[None]
     along = np.einsum("nmk,mk->nm", offset, line) / length**2
     aside = np.abs(offset[..., 0] * line[None, :, 1] - offset[..., 1] * line[None, :, 0]) / length
+    # beside the middle of two long beds one is still between them
+    normal = np.abs(np.stack((-line[:, 1], line[:, 0]), axis=1)) / length[:, None]
+    reach = [np.einsum("mk,mk->m", normal, one.size[:, :2]) / 2 for one in (first, second)]
+    aside = np.maximum(aside - np.minimum(*reach), 0)
     widest = np.maximum(ASIDE_SHARE * length, ASIDE_LEAST_M)
     inner = np.clip((0.5 - np.abs(along - 0.5)) * 5, 0, 1)  # a half at a tenth of the way, whole from a fifth on
     rise = np.abs(case.targets.center[:, None, 2] - ((first.center + second.center) / 2)[None, :, 2])

@@ -31,6 +31,7 @@ ASIDE_M = 0.3  # departs: a picture hangs above the sofa that it does not overla
 RISE_M = 3.0  # departs: of two things above the table, the closer one is meant, a little
 MIX_M = 0.1  # departs: heights that differ by less are level
 INSIDE_SHARE = 0.7  # departs: share of the target's volume within the anchor's box from which on it is inside
+TUCKED, TUCKED_M = 0.6, 0.2  # departs: how well that is "under", and the gap that halves it
 OPEN_BELOW = ("table", "desk", "chair", "bed", "bench", "stool", "sofa", "couch", "armchair", "piano", "sink")
 RAISED = 0.3  # departs: what is within the box of these is in or on them only when it is off the floor by this share
 GROWN_M = 0.05  # departs: the anchor's box is grown by this, for what was measured of its walls
@@ -61,7 +62,12 @@ def under_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
     lower = np.clip(0.5 + rise / (2 * MIX_M), 0, 1)
     # without a footprint in common it must be wholly lower: what stands beside a table is not under it
     aside = 0.8 * halving(flat_m(gaps), ASIDE_M) * np.clip(0.5 + (apart + MIX_M) / (2 * MIX_M), 0, 1)
-    return np.asarray(lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * halving(apart, RISE_M))
+    below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * halving(apart, RISE_M)
+    # a chair that is tucked under a desk mostly stands before it, and its back rises above the desk's middle
+    legs = np.array([_has_legs(label) for label in anchors.labels], bool)[None]
+    stands = (targets.low[:, None, 2] - anchors.low[None, :, 2]) < OFF_GROUND_M
+    lowered = targets.center[:, None, 2] < anchors.high[None, :, 2]
+    return np.maximum(below, TUCKED * legs * stands * lowered * halving(flat_m(gaps), TUCKED_M))
 
 
 def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
@@ -78,6 +84,10 @@ def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
     rooms = np.array([bool(one) and one[0] == "R" for one in anchors.ids], bool)
     same = targets.room[:, None] == anchors.room[None]
     return np.where(rooms[None] & (anchors.room >= 0)[None], same.astype(float), np.where(share > 0.95, 1.0, fit))
+
+
+def _has_legs(label: str) -> bool:
+    return label.rsplit(" ", 2)[-2] in ("desk", "table") if " " in label else False
 
 
 def _is_open_below(label: str) -> bool:
