@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from placegraph.nodes.grounding.llm import LanguageModel
 from placegraph.nodes.grounding.notation import NEVER_FIRST, read, write
+from placegraph.nodes.grounding.reading import default_adapter_path, read_request
 from placegraph.nodes.grounding.schema import ANYTHING, SAME_KIND, Thing, normal
 from placegraph.nodes.grounding.words import tokens
 
@@ -61,3 +63,18 @@ def test_nouns_and_words_are_the_requests_own():
             # A span that starts with such a word is not in the grammar at all.
             strange += [(line, span) for span in spans if span.split(" ")[0] in NEVER_FIRST]
     assert strange == []
+
+
+@pytest.mark.weights
+@pytest.mark.skipif(not REQUESTS.exists(), reason="people's requests lie beside a development checkout")
+def test_the_packaged_reader_reads_people():
+    sentences = [json.loads(line)["text"] for line in REQUESTS.read_text().splitlines()]
+    model = LanguageModel(adapter_path=default_adapter_path())
+    exact = noun = 0
+    for label in LABELS:
+        found = normal(read_request(model, sentences[label["line"]]).thing)
+        right = [normal(read(program)) for program in label["programs"]]
+        exact += found in right
+        noun += found.noun in {one.noun for one in right}
+    model.close()
+    assert exact >= 55 and noun >= 95, (exact, noun)  # of 100; README has what they are
