@@ -66,13 +66,18 @@ class Allowed:
         """Whether only the end may follow."""
         return len(self._among(np.array([self._end]))) > 0 and all(map(self.is_end, self._among(self._all).tolist()))
 
-    def best(self, values: NDArray[np.float64]) -> int:
-        """The allowed token of highest value, the first of equals."""
+    def best(self, values: NDArray[np.float64]) -> tuple[int, float]:
+        """The allowed token of highest log-probability, the first of equals, and that log-probability.
+
+        Where the favourite of all is not allowed it is that among the allowed ones: who is held back is not in doubt.
+        """
         favourite = int(values.argmax())
         if len(self._among(np.array([favourite]))):
-            return favourite
+            return favourite, float(values[favourite])
         allowed = self._among(self._all)
-        return int(allowed[values[allowed].argmax()])
+        among = values[allowed]
+        highest = float(among.max())
+        return int(allowed[among.argmax()]), -float(np.log(np.exp(among - highest).sum()))
 
     def _among(self, tokens: NDArray[np.int64]) -> NDArray[np.int64]:
         """Those of the tokens that the grammar allows next."""

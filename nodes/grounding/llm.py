@@ -50,7 +50,7 @@ def prompt(name: str, **values: str) -> str:
 
 @dataclass(frozen=True)
 class Reply:
-    """What the model wrote, and the log-probability of these tokens in nats, as it was before the grammar."""
+    """What the model wrote, and the log-probability in nats of its tokens (where held back, among those allowed)."""
 
     text: str
     log_probability: float
@@ -190,8 +190,8 @@ class LanguageModel:
                 if written:
                     self._llama.eval(written[-1:])
                 values = self._next_log_probabilities()
-                token = allowed.best(values)
-                total += float(values[token])
+                token, value = allowed.best(values)
+                total += value
                 if allowed.is_end(token):
                     break
                 allowed.accept(token)

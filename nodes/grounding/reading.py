@@ -73,7 +73,7 @@ def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Readi
     try:
         said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
     except ReplyCut:
-        return Reading(Thing(), 0.0)
+        return Reading(Thing(noun=next(word for word in tokens(text) if word[0].isalnum())), 0.0)
     return Reading(with_noun(read(said.text)), math.exp(said.log_probability))
 
 

@@ -123,3 +123,13 @@ def test_the_deductive_mode_is_asked_for_by_its_name(node, ask, graph_message, h
     assert answer["evidence"][0] == "read level by level (deductive mode)"
     assert answer["llm_calls"] >= 2
     assert set(answer["parse"]) == {"floors", "rooms", "locations", "targets", "anchors"}
+
+
+def test_a_doubtful_reading_gives_way_to_the_deductive_mode_openly(node, ask, graph_message, house, monkeypatch):
+    node.step(graph_message(house))
+    monkeypatch.setattr("placegraph.nodes.grounding.answer.LEAST_CONFIDENCE", 1.1)
+    found = ask(node, "the vase near the sofa", mode="program")
+    assert any("doubtful" in sentence and "level by level" in sentence for sentence in found["evidence"])
+    assert found["llm_calls"] > 1 and (found["object_id"] is None or found["object_id"] in house.nodes)
+    # what nobody in the map is called is not asked for twice
+    assert not any("level by level" in sentence for sentence in ask(node, "flurb gnax", mode="program")["evidence"])

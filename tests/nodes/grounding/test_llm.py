@@ -111,7 +111,7 @@ def test_the_openings_kept_are_bounded(model):
     assert decoded(model) == first
 
 
-def test_a_reply_says_how_likely_it_was_before_the_grammar(model):
+def test_a_reply_says_how_likely_it_was_among_what_is_allowed(model):
     prompt, rules = "One, two, three, four,", 'root ::= " five" | " seven"'
     free = model.complete(prompt, rules, 8)
     assert free.text == " five"
@@ -119,7 +119,8 @@ def test_a_reply_says_how_likely_it_was_before_the_grammar(model):
     assert free.log_probability == pytest.approx(values[0], abs=0.02)  # read in one piece there, in two here
     forced = model.complete(prompt, 'root ::= " seven"', 8)
     assert forced.text == " seven"
-    assert forced.log_probability == pytest.approx(values[1], abs=0.02)
+    assert forced.log_probability > values[1] + 1  # " s" and " se" are allowed, too
+    assert values[1] < -3
 
 
 def test_where_the_end_and_more_are_allowed_the_model_decides(model):
