@@ -64,7 +64,7 @@ def _tags(value: object) -> tuple[Tag, ...]:
     tags = []
     for i, entry in enumerate(value):
         name, weight = entry if isinstance(entry, list) and len(entry) == 2 else (entry, LATER_NAME if i else 1.0)
-        tags.append(Tag(_text(name, what), _numbers([weight], (1,), "weights", 0.0)[0]))
+        tags.append(Tag(_text(name, what).lower(), _numbers([weight], (1,), "weights", 0.0)[0]))
     return tuple(sorted(tags, key=lambda tag: -tag.weight))
 
 

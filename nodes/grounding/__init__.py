@@ -19,7 +19,7 @@ from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES, Namer
 from placegraph.nodes.grounding.options import SAFE
 from placegraph.nodes.grounding.reading import default_adapter_path
 from placegraph.nodes.grounding.reply import error_answer, to_json
-from placegraph.runtime.errors import ConfigError, QueryError
+from placegraph.runtime.errors import ConfigError, ModelError, QueryError
 from placegraph.runtime.messages import Answer, Graph, Message, PlaceNames, Question
 from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.scene_graph import SceneGraph
@@ -103,7 +103,7 @@ class Grounding(Node):
             if self._graph is None:
                 raise QueryError("no scene graph has arrived yet")
             fields = self._reasoner.answer(self._graph, self._revision, question)
-        except QueryError as error:  # a question always gets a reply
+        except (QueryError, ModelError) as error:  # a question always gets a reply
             fields = error_answer(question, self._revision, str(error))
         return Answer(
             frame_id=question.frame_id,

@@ -6,7 +6,7 @@ Source: paper, "Deductive Hierarchical Reasoning Algorithm"; METHOD section 10.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -107,14 +107,25 @@ class Reasoner:
         read = read_request if self._model.adapter_path else read_by_examples
         reading = read(self._model, question.text)
         confidence = round(float(reading.confidence), 4)
-        if confidence < LEAST_CONFIDENCE and _names_something(graph, question.text):
-            reasoned = self._by_levels(graph, question)
-            doubt = (
-                f"the reading of the request is doubtful (confidence {confidence:.2f}), so it was asked level by level"
-            )
-            reasoned.ranking.notes.insert(0, doubt)
-            return reasoned
-        return self._executed(graph, question, Program(target=reading.thing), "model", confidence)
+        if reading.thing is not None and confidence >= LEAST_CONFIDENCE:
+            return self._executed(graph, question, Program(target=reading.thing), "model", confidence)
+        return self._doubtful(graph, question, reading.thing, confidence)
+
+    def _doubtful(self, graph: SceneGraph, question: Question, thing: Thing | None, confidence: float) -> Reasoned:
+        """The deductive mode's answer; where it gives none what was read (None: nothing) is followed all the same."""
+        doubt = f"the reading of the request is doubtful (confidence {confidence:.2f})"
+        reasoned: Reasoned | None = None
+        if _names_something(graph, question.text):
+            try:
+                reasoned = self._by_levels(graph, question)
+                doubt += ", so it was asked level by level"
+            except QueryError as error:
+                doubt += f", and level by level there is no answer: {error}"
+        if reasoned is None and thing is not None:
+            reasoned = self._executed(graph, question, Program(target=thing), "model", confidence)
+        reasoned = reasoned or self._by_rules(graph, question)
+        reasoned.ranking.notes.insert(0, doubt)
+        return replace(reasoned, sure=False)
 
     def _by_levels(self, graph: SceneGraph, question: Question) -> Reasoned:
         if not self._use_model:

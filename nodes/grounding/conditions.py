@@ -103,7 +103,8 @@ class Conditions:
         seen = look(condition.words, nodes, weighing.boxes, weighing.peers)
         if not seen.known:
             self.ranking.note(f"the map does not tell what is {condition.words}")
-        weighing.judged(seen.values, seen.sentences.__getitem__, negated=condition.negated)
+        if seen.known or not condition.negated:  # what is not known to be so is not known not to be so
+            weighing.judged(seen.values, seen.sentences.__getitem__, negated=condition.negated)
 
     def _apply_group(self, weighing: Weighing, condition: Condition) -> None:
         among = weighing.among() if condition.name == "count" else weighing.peers
@@ -122,6 +123,8 @@ class Conditions:
         outcome = related(condition, weighing.boxes, anchors, self.layout, self.views)
         if not outcome.known:
             self.ranking.note(f"the map holds nothing about {write(Thing(noun='x', conditions=(condition,)))[3:]}")
+            if condition.negated:
+                return None
         weighing.judged(outcome.values, outcome.sentence, trust=outcome.trust, negated=condition.negated)
         for inner, found in zip(condition.things, anchors, strict=True):
             if found.single and not condition.negated:

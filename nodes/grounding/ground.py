@@ -13,8 +13,8 @@ import numpy as np
 from placegraph.nodes.grounding.boxes import F64, Boxes, Layout, layout_of
 from placegraph.nodes.grounding.conditions import NOT_THINGS, Conditions, says
 from placegraph.nodes.grounding.names import Fit, Names
-from placegraph.nodes.grounding.ranking import Candidate, Ranking
-from placegraph.nodes.grounding.schema import Program, Thing
+from placegraph.nodes.grounding.ranking import TIE, Candidate, Ranking
+from placegraph.nodes.grounding.schema import SAME_KIND, Program, Thing
 from placegraph.nodes.grounding.select import Scope, narrow, places_called
 from placegraph.nodes.grounding.view import Views
 from placegraph.nodes.grounding.weighing import Weighing
@@ -26,7 +26,8 @@ FAR_BETTER = 2.0  # departs: what holds by a hair does not go before what is so 
 FACED = 0.9  # departs: anchors of a view that fit nearly as well as the best vote on where it looks
 BESIDE_M, STOREY_M = 1.5, 2.0  # departs: who stands so near to one of several doors means that one
 DOORS = frozenset(
-    ("enter", "entering", "entrance", "enters", "entry", "exit", "walk", "walking", "come", "coming", "in", "doorway",
+    ("enter", "entering", "entered", "the", "room", "into", "through", "stepping", "walks", "inside",
+     "entrance", "enters", "entry", "exit", "walk", "walking", "come", "coming", "in", "doorway",
      "walked", "entered", "step", "outside", "entryway")
 )  # fmt: skip
 
@@ -111,9 +112,15 @@ class Grounder:
             ranking.candidates.append(Candidate(fits[i].node, float(scores[i]), evidence, bool(weighing.holds[i])))
         best = ranking.candidates[0]
         ranking.sure &= best.holds
-        if not best.holds and not says(thing.noun):
+        if says(thing.noun):
+            return
+        related = any(one.kind == "relation" and not one.negated for one in thing.conditions)
+        if not best.holds and related and thing.noun != SAME_KIND:
             # "what is under the bed?": of anything, only what is there is an answer
             ranking.notes += best.evidence
+            ranking.candidates.clear()
+        elif len(fits) > 1 and scores.max() - scores.min() < TIE:
+            ranking.note("nothing that is said tells one thing from another")
             ranking.candidates.clear()
 
     def _targets(self, noun: str, scope: Scope, ranking: Ranking) -> list[Fit]:

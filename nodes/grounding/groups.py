@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 from placegraph.nodes.grounding.boxes import F64, I64, Boxes
 from placegraph.nodes.grounding.relations import apart_m, gaps_m
@@ -15,12 +17,15 @@ from placegraph.nodes.grounding.schema import Condition
 
 ALONE_M = 2.0  # departs: what has nothing like it within this is by itself; at half of it it may be
 GROUP_M = (0.3, 0.8, 1.5)  # departs: gaps that may still hold a group of things together
+MOST_PEERS = 1500  # departs: nobody counts more, and all gaps among them are held at once
 UNKNOWN = 0.5  # of what is not among those compared
 
 
 def group_fits(boxes: Boxes, rows: I64, condition: Condition) -> tuple[F64, Callable[[int], str]]:
     """(n,) fits of `alone` or `count`, compared among some rows, and a sentence for each."""
     values = np.full(len(boxes), UNKNOWN)
+    if len(rows) > MOST_PEERS:
+        return values, lambda i: ""
     peers = boxes.take(rows)
     gap = apart_m(gaps_m(peers, peers))
     if condition.name == "alone":
@@ -40,10 +45,5 @@ def group_fits(boxes: Boxes, rows: I64, condition: Condition) -> tuple[F64, Call
 
 def _group_sizes(gap: F64, limit: float) -> F64:
     """(n,) how many hang together with each by gaps (n, n) up to a limit; itself counted."""
-    reach = (gap <= limit) | np.eye(len(gap), dtype=bool)
-    for _ in range(len(gap).bit_length()):
-        wider = (reach.astype(np.int32) @ reach.astype(np.int32)) > 0
-        if (wider == reach).all():
-            break
-        reach = wider
-    return np.asarray(reach.sum(axis=1), float)
+    _, group = connected_components(csr_matrix(gap <= limit), directed=False)
+    return np.asarray(np.bincount(group)[group], float)

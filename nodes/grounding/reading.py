@@ -28,7 +28,7 @@ REPLY_TOKENS = 96  # departs: 57 are the most of 2,000 generated programs; a rep
 class Reading:
     """What was read, and how likely the model found just this program (0 to 1)."""
 
-    thing: Thing
+    thing: Thing | None  # None: what the model wrote did not end
     confidence: float
 
 
@@ -73,7 +73,7 @@ def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Readi
     try:
         said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
     except ReplyCut:
-        return Reading(Thing(noun=next(word for word in tokens(text) if word[0].isalnum())), 0.0)
+        return Reading(None, 0.0)
     return Reading(with_noun(read(said.text)), math.exp(said.log_probability))
 
 

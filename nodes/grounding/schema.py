@@ -2,7 +2,7 @@
 
 One schema for all that people say of an object (target, attributes, anchors with conditions of their own, relations,
 negation, ordinals, superlatives, groups, viewpoints, room, floor). Source: METHOD section 10, step 1; the conventions
-of `CONDITIONS` come from reading 300 requests of people (Nr3D). Departs: the paper has targets and anchors only.
+of `CONDITIONS` come from reading 400 requests of people (Nr3D). Departs: the paper has targets and anchors only.
 """
 
 from __future__ import annotations

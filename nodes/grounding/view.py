@@ -19,7 +19,9 @@ LONG_FACED = ("bed", "couch bed", "bunk bed", "bathtub", "crib")  # faced along 
 AT_ROOM_M = 1.5  # departs: what one may stand at belongs to a room within this, through its wall
 MIDDLE_TRUST = 0.5  # departs: nobody said where the viewer is; the room's centre is right more often than not
 SAME_WAY = 0.9  # departs: cosine of lines of sight that look at the same wall
+MOST_FACED = 50  # departs: more things than this nobody looks at; the best named are asked
 ROW_RATIO = 3.0  # departs: as long to wide as things must lie to be a row that people stand before
+ROW_ALONG = 0.95  # departs: cosine; rows stand along walls, what lies aslant is no row
 ROW_ASIDE_M = 0.3  # departs: a row through the room's middle has no side on which one stands
 HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before the bed
 
@@ -153,11 +155,9 @@ class Views:
         row = self._row(things)
         if row is not None:
             return row
-        ways = [self.facing(things.take([j])) for j in range(len(things))]
-        sights = [way.forward for way in ways if way.forward is not None]
-        votes = [sum(float(way.forward @ other) > SAME_WAY for other in sights) if way.forward is not None else 0
-                 for way in ways]  # fmt: skip
-        return ways[int(np.argmax(votes))]
+        ways = [self.facing(things.take([j])) for j in range(min(len(things), MOST_FACED))]
+        sights = np.array([np.zeros(2) if way.forward is None else way.forward for way in ways])
+        return ways[int(np.argmax((sights @ sights.T > SAME_WAY).sum(axis=1)))]
 
     def _row(self, things: Boxes) -> View | None:
         """The view of one who has a row of things of one room before him, across it; None where they are none."""
@@ -169,9 +169,10 @@ class Views:
             return None
         middle, room = centers.mean(axis=0), self.layout.room_center(things.room[:1])[0]
         across = float((middle - room) @ axes[:, 0])
-        if abs(across) < ROW_ASIDE_M:
+        if abs(across) < ROW_ASIDE_M or np.abs(axes[:, 0]).max() < ROW_ALONG:
             return None
-        forward = axes[:, 0] * np.sign(across)
+        forward = np.round(axes[:, 0]) * np.sign(across)
+        across = float((middle - room) @ forward)
         return View(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
 
     def away(self, things: Boxes) -> View:

@@ -79,14 +79,16 @@ class Weighing:
         values = np.full(len(self), OUTRANKED)
         places = order(measure[rows])
         there = len(rows)
-        if there >= number:
-            wanted = float(measure[rows][places == number][0])
+        reached = min(number, there)  # of three the fifth is misread or miscounted: the last one comes nearest to it
+        if there:
+            wanted = float(measure[rows][places == reached][0])
             span = max(float(np.ptp(measure[rows])), 1e-6)
             off = np.abs(measure[rows] - wanted)
-            runners = RUNNER_UP * (1 - MEASURED * off / span) / np.maximum(np.abs(places - number), 1) ** 0.5
-            values[rows] = np.where(places == number, 1.0, np.where(off <= margin, LEVEL, runners))
-        else:
-            values[rows] = RUNNER_UP
+            runners = RUNNER_UP * (1 - MEASURED * off / span) / np.maximum(np.abs(places - reached), 1) ** 0.5
+            values[rows] = np.where(places == reached, 1.0, np.where(off <= margin, LEVEL, runners))
+            values[rows] *= 1.0 if there >= number else RUNNER_UP
+        if negated:  # what the rank is not said of stays behind
+            values[np.setdiff1d(np.arange(len(self)), rows)] = 1 - OUTRANKED
         place = {int(row): int(k) for row, k in zip(rows, places, strict=True)}
         short = f"; there are only {there}, not {number}" if there < number else ""
 

@@ -100,7 +100,8 @@ def _facing(case: Case) -> Fits:
     cosine = np.einsum("nk,nmk->nm", case.targets.front, way)
     known = bool(np.isfinite(case.targets.front).all(axis=1).any())
     near = halving(apart_m(gaps_m(case.targets, anchors)), 4.0)
-    values = np.where(np.isfinite(cosine), np.clip(0.5 + (cosine - FACING_COSINE), 0, 1), 0.5) * (0.5 + 0.5 * near)
+    turned = np.clip(0.5 + (cosine - FACING_COSINE), 0, 1) * (0.5 + 0.5 * near)
+    values = np.where(np.isfinite(cosine), turned, 0.5 + 0.2 * near)  # not known: of several the nearest
 
     def sentence(i: int, j: int) -> str:
         a, b = case.targets.labels[i], anchors.labels[j]

@@ -47,9 +47,9 @@ def main(arguments):
     adapter = Path(next((a for a in arguments if a.endswith(".gguf")), default_adapter_path()))
     model = LanguageModel(adapter_path=adapter)
     ways = {
-        "adapter": lambda text: (lambda r: (r.thing, r.confidence))(read_request(model, text)),
-        "plain": lambda text: (lambda r: (r.thing, r.confidence))(read_request(model, text, adapted=False)),
-        "examples": lambda text: (lambda r: (r.thing, r.confidence))(read_by_examples(model, text)),
+        "adapter": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(read_request(model, text)),
+        "plain": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(read_request(model, text, adapted=False)),
+        "examples": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(read_by_examples(model, text)),
         "rules": by_rules,
     }
     kept = [(one.text, [one.program]) for one in examples(1_000_003, 500, 300, held_out=True)]

@@ -29,7 +29,7 @@ class Example:
 def examples(seed: int, start: int, count: int, *, held_out: bool = False) -> list[Example]:
     """Examples number start to start + count of a seed, each the same whatever is asked for beside it.
 
-    held_out: with nouns and phrasings that no other example has.
+    held_out: half of what is drawn from a list is of the nouns and phrasings that no other example has.
     """
     return [_example(seed, number, held_out) for number in range(start, start + count)]
 
