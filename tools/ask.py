@@ -102,9 +102,12 @@ def _in_words(reply: dict[str, Any]) -> str:
             degrees = math.degrees(reply["approach"]["yaw_rad"])
             lines.append(f"stand: at {reply['approach']['position']} m, looking to {degrees:.0f} degrees")
         if reply["route"]:
-            lines.append(f"way:   {' > '.join(reply['route'])}, {reply['travel_m']} m")
+            lines.append(f"way:   {' > '.join(map(str, reply['route']))}, {reply['travel_m']} m")
     else:
         lines.append("not in the map")
+    parse = reply["parse"] or {}
+    if parse.get("text"):
+        lines.append(f"read:  {parse['text']}")
     lines += [f"  - {sentence}" for sentence in reply["evidence"]]
     if len(reply["candidates"]) > 1:
         lines.append("candidates: " + ", ".join(f"{c['id']} {c['name']} {c['score']:.2f}" for c in reply["candidates"]))

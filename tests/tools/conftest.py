@@ -41,6 +41,7 @@ model = "drawn_scene"
 
 [nodes.grounding]
 name_places = false
+use_model = false
 
 [nodes.recorder]
 """

@@ -34,6 +34,7 @@ def test_found_in_words(cli, mapped) -> None:
     lines = done.out.splitlines()
     assert lines[0].startswith(f"{reply['object_id']}  chair") and lines[1].startswith("where: building (B0) > ")
     assert lines[2] == f"box:   {reply['box'][0]} to {reply['box'][1]} m"
+    assert "read:  chair" in lines
     assert lines[-1].startswith(f"candidates: {reply['object_id']} chair ")
     from_here = cli("ask", mapped, "a chair", "--pose", "1,1,1.4").out.splitlines()
     assert sum(line.startswith("way:   R") and line.endswith(" m") for line in from_here) == 1
