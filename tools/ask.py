@@ -23,8 +23,8 @@ def ask(
         str, typer.Argument(metavar="MAP|live", help="A map folder, a graph file, an object list; live: a running one.")
     ] = "",
     text: Annotated[
-        str, typer.Argument(metavar="TEXT", help='What to look for, e.g. "the vase near the window upstairs".')
-    ] = "",
+        str | None, typer.Argument(metavar="TEXT", help='What to look for, e.g. "the vase near the window upstairs".')
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the reply as JSON (README, Asking).")] = False,
     k: Annotated[int, typer.Option(help="How many candidates to list.")] = 5,
     mode: Annotated[
@@ -34,7 +34,7 @@ def ask(
         str, typer.Option(help="Where the asker stands: x,y,z[,yaw]; metres, degrees from x, world frame.")
     ] = "",
     graph: Annotated[Path | None, typer.Option(help="With --batch: what is asked, as MAP.")] = None,
-    batch: Annotated[Path | None, typer.Option(help="Instead of TEXT: a file of questions (README, Asking).")] = None,
+    batch: Annotated[Path | None, typer.Option(help="Instead of TEXT: a file of questions (README, Other data).")] = None,
     out: Annotated[Path | None, typer.Option(help="With --batch: the file for the answers.")] = None,
     endpoint: Annotated[str, typer.Option(help="live: where the hub listens.")] = BusConfig().endpoint,
     prefix: Annotated[str, typer.Option(help="live: first part of the keys.")] = BusConfig().prefix,
@@ -45,11 +45,11 @@ def ask(
     Exit status: 0 found, or a batch done; 3 not in the map, 1 the question could not be answered, 2 wrong usage.
     """
     if batch is not None:
-        if where or text or as_json or pose or out is None:
+        if where or text is not None or as_json or pose or out is None:
             raise typer.BadParameter("takes --out, and no MAP, TEXT, --json or --pose", param_hint="--batch")
         _ask_all(batch, out, graph, k, mode)
         return
-    if graph is not None or out is not None or not where:
+    if graph is not None or out is not None or not where or text is None:
         raise typer.BadParameter("expected MAP TEXT, or --batch QUESTIONS --out ANSWERS [--graph MAP]")
     # refuses what no map can answer
     standing = _pose(pose)
