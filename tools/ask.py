@@ -23,7 +23,7 @@ def ask(
         str, typer.Argument(metavar="MAP|live", help="A map folder, a graph file, an object list; live: a running one.")
     ] = "",
     text: Annotated[
-        str | None, typer.Argument(metavar="TEXT", help='What to look for, e.g. "the vase near the window upstairs".')
+        str | None, typer.Argument(metavar="TEXT", help='What to look for: "the vase near the window upstairs".')
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the reply as JSON (README, Asking).")] = False,
     k: Annotated[int, typer.Option(help="How many candidates to list.")] = 5,
@@ -34,7 +34,7 @@ def ask(
         str, typer.Option(help="Where the asker stands: x,y,z[,yaw]; metres, degrees from x, world frame.")
     ] = "",
     graph: Annotated[Path | None, typer.Option(help="With --batch: what is asked, as MAP.")] = None,
-    batch: Annotated[Path | None, typer.Option(help="Instead of TEXT: a file of questions (README, Other data).")] = None,
+    batch: Annotated[Path | None, typer.Option(help="Instead of TEXT: questions (README, Other data).")] = None,
     out: Annotated[Path | None, typer.Option(help="With --batch: the file for the answers.")] = None,
     endpoint: Annotated[str, typer.Option(help="live: where the hub listens.")] = BusConfig().endpoint,
     prefix: Annotated[str, typer.Option(help="live: first part of the keys.")] = BusConfig().prefix,
