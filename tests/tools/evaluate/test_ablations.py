@@ -55,8 +55,6 @@ def test_each_variant_answers(scene) -> None:
         reply = asker.ask(variant, scene, scene.questions[0])
         assert reply.status in ("found", "not_in_map"), variant
         assert (reply.calls > 0) == (variant not in ("oracle", "rules")), variant
-            variant
-        )
     asker.model.close()
 
 
