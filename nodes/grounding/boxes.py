@@ -81,8 +81,7 @@ class Layout:
     rooms: tuple[Node, ...]
     room_low: F64  # (R + 1, 3); the last row, which -1 means, is the building
     room_high: F64
-    objects: I64  # rows
-    places: I64
+    places: I64  # rows
     yaw: float = 0.0  # rad, of the building in the world
 
     def from_world(self, xyz: F64) -> F64:
@@ -163,7 +162,6 @@ def layout_of(graph: SceneGraph) -> Layout:
         rooms=rooms,
         room_low=room_boxes[:, 0],
         room_high=room_boxes[:, 1],
-        objects=np.arange(len(objects)),
         places=np.arange(len(objects), len(nodes)),
         yaw=yaw,
     )  # fmt: skip

@@ -21,7 +21,7 @@ OTHER_ROOM = 0.5  # departs: what is said of two things is meant within one room
 DOUBT_M = 2.0  # departs: how much farther away an anchor counts for a rank that is half as well named
 MISCOUNT = 0.6  # departs: for each thing more or less than was counted
 MOST_ENDS = 16  # departs: of "between": the anchors of each side that are paired
-SAME_ROOM_ONLY = frozenset(("closest", "farthest", "in", "holds", "with"))  # these see to walls themselves
+UNDAMPED = frozenset(("closest", "farthest", "in", "holds", "with"))  # a wall between counts no further for these
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ def related(condition: Condition, targets: Boxes, anchors: Sequence[Anchors], la
         return _farther(fits, weights, own, name, trust)
     assert case.anchors is not None
     values = np.where(own, 0.0, fits.values)
-    if name not in SAME_ROOM_ONLY and case.anchors.ids and any(case.anchors.ids):
+    if name not in UNDAMPED and case.anchors.ids and any(case.anchors.ids):
         values = values * np.where(walled(targets, case.anchors) > 0, OTHER_ROOM, 1.0)
     soft = values * weights[None]
     best = soft.argmax(axis=1) if soft.size else np.zeros(len(targets), np.int64)

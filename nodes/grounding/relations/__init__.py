@@ -49,7 +49,6 @@ class Fits:
     margin: float = 0.0
     trust: float = 1.0
     known: bool = True  # False: the map holds no evidence for it
-    view: str = ""  # whose view it is, where one matters
 
 
 @dataclass(frozen=True)

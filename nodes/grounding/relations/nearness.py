@@ -43,7 +43,6 @@ def _to_viewer(case: Case) -> Fits:
         lambda i, _: f"{case.targets.labels[i]} is {away[i]:.2f} m from the {view.source}",
         MARGIN_M,
         view.trust,
-        view=view.source,
     )
 
 

@@ -70,8 +70,7 @@ def judge(case: Case) -> Fits:
         words = "m to the left of their middle"
     sentence = f"{words}, seen from the {view.source}"
     return Fits(
-        values[:, None], lambda i, _: f"{targets.labels[i]} is {ahead[i]:+.2f} {sentence}", MARGIN_M, view.trust,
-        view=view.source,
+        values[:, None], lambda i, _: f"{targets.labels[i]} is {ahead[i]:+.2f} {sentence}", MARGIN_M, view.trust
     )  # fmt: skip
 
 

@@ -62,7 +62,7 @@ def judge(case: Case) -> Fits:
         return f"{a} is {abs(ahead[i, j]):.2f} m {side} {b} {seen} and {gap[i, j]:.2f} m from it"
 
     trust = float(lines.trust.max()) if len(anchors) and case.relation in ("left", "right") else 1.0
-    return Fits(values, sentence, trust=trust, view=lines.sources[0] if len(anchors) else "")
+    return Fits(values, sentence, trust=trust)
 
 
 def _share(main: F64, half: F64, cross: F64) -> F64:
