@@ -10,12 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
+from placegraph.runtime.arrays import F32, U8, Bool
 
-U8 = NDArray[np.uint8]
-F32 = NDArray[np.float32]
-Masks = list[NDArray[np.bool_]]
+Masks = list[Bool]
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from placegraph.models_onnx import F32, U8, Masks
+from placegraph.models_onnx import Masks
 from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.yolo import prepare
+from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placegraph.models_onnx import Boxes
-
-F32 = NDArray[np.float32]
-I64 = NDArray[np.int64]
+from placegraph.runtime.arrays import F32, I64
 
 MAX_CANDIDATES = 1000  # boxes that enter suppression; bounds its time on a network that fires everywhere
 

@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from placegraph.models_onnx import F32, U8, ScoredNames
+from placegraph.models_onnx import ScoredNames
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
+from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-U8 = NDArray[np.uint8]
-F32 = NDArray[np.float32]
+from placegraph.runtime.arrays import F32, U8
 
 FILL = 114  # YOLOX and YOLOv8 were trained with this grey
 

@@ -11,9 +11,10 @@ import math
 import cv2
 import numpy as np
 
-from placegraph.models_onnx import F32, U8, ScoredNames
+from placegraph.models_onnx import ScoredNames
 from placegraph.models_onnx.manifest import ModelOptions, Weights, read_lines
 from placegraph.models_onnx.session import Session
+from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # ImageNet's, RGB of 0..1

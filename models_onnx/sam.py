@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from placegraph.models_onnx import F32, U8, Masks
+from placegraph.models_onnx import Masks
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session, Shape
+from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
 LONG_SIDE = 1024  # px of the longer image side in the encoder's input; SAM

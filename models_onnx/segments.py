@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import F32, Masks
+from placegraph.models_onnx import Masks
+from placegraph.runtime.arrays import F32
 from placegraph.runtime.messages import Keyframe, Segments
 
 

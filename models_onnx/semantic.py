@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from placegraph.models_onnx import F32, U8, Boxes, Instances, Masks, ScoredNames
+from placegraph.models_onnx import Boxes, Instances, Masks, ScoredNames
 from placegraph.models_onnx.boxes import iou
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
+from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import ModelError
 
 
@@ -53,7 +54,7 @@ class FAMILY:
         A piece's score is the mean confidence of its pixels. Raises ModelError when the network cannot be run.
         """
         labels, confidence = self.classify(image)
-        found: list[tuple[float, str, list[int], NDArray[np.bool_]]] = []
+        found: list[tuple[float, str, list[int], Bool]] = []
         sure = confidence >= self._options.min_confidence
         for label in self._objects:
             of_class = ((labels == label) & sure).astype(np.uint8)

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import F32, U8, Boxes, boxes
+from placegraph.models_onnx import Boxes, boxes
 from placegraph.models_onnx.letterbox import Letterbox, fit
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
-from placegraph.models_onnx.text import DIMENSIONS, TextEncoder
+from placegraph.models_onnx.text_encoder import DIMENSIONS, TextEncoder
+from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
 

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from placegraph.models_onnx import U8, ScoredMasks, yolo_seg
+from placegraph.models_onnx import ScoredMasks, yolo_seg
 from placegraph.models_onnx.manifest import Weights
+from placegraph.runtime.arrays import U8
 from placegraph.runtime.errors import ModelError
 
 LABEL = "location"

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from placegraph.models_onnx import F32, U8, Boxes, Instances, Masks, boxes
+from placegraph.models_onnx import Boxes, Instances, Masks, boxes
 from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.yolo import input_size, prepare
+from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
 

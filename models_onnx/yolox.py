@@ -11,10 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import F32, U8, Boxes, boxes
+from placegraph.models_onnx import Boxes, boxes
 from placegraph.models_onnx.letterbox import fit
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
+from placegraph.runtime.arrays import F32, I64, U8
 from placegraph.runtime.errors import ModelError
 
 STRIDES = (8, 16, 32)
@@ -55,7 +56,7 @@ class FAMILY:
         kept = boxes.suppress(found, scores, classes, self._options.nms_iou)
         return boxes.named(self._labels, classes[kept], found[kept], scores[kept])
 
-    def _decode(self, raw: F32, anchors: boxes.I64) -> F32:
+    def _decode(self, raw: F32, anchors: I64) -> F32:
         """Grid offsets and log sizes (K, 4) to cx cy w h in px of the input."""
         strides = self._strides[anchors, None]
         centres = (raw[:, :2] + self._cells[anchors]) * strides

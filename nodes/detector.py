@@ -10,8 +10,8 @@ from pydantic import Field
 
 from placegraph.models_onnx import Detector
 from placegraph.models_onnx.load import load, wrong_task
-from placegraph.runtime.join import Join
 from placegraph.runtime.messages import Detections, Keyframe, Message, Tags
+from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Node, NodeConfig
 
 
@@ -31,8 +31,8 @@ class DetectorNode(Node):
     """
 
     config_type: ClassVar[type[NodeConfig]] = DetectorConfig
-    takes = (Keyframe, Tags)
-    gives = (Detections,)
+    inputs = (Keyframe, Tags)
+    outputs = (Detections,)
     restartable: ClassVar[bool] = True
 
     def start(self) -> None:
@@ -46,11 +46,11 @@ class DetectorNode(Node):
         if not isinstance(model, Detector):
             raise wrong_task("detector", self.config.model, model, "find boxes")
         self._model: Detector = model
-        self._join = Join(Keyframe, Tags)
+        self._synchronizer = FrameSynchronizer(Keyframe, Tags)
 
     def step(self, message: Message) -> Sequence[Message]:
         """When both a Keyframe and its Tags are there, give its Detections, best first."""
-        match self._join.add(message):
+        match self._synchronizer.add(message):
             case (Keyframe() as keyframe, Tags() as tags):
                 return [self._detect(keyframe, tags)]
             case _:

@@ -31,8 +31,8 @@ class InstancesNode(Node):
     """
 
     config_type: ClassVar[type[NodeConfig]] = InstancesConfig
-    takes = (Keyframe,)
-    gives = (Detections, Segments)
+    inputs = (Keyframe,)
+    outputs = (Detections, Segments)
     restartable: ClassVar[bool] = True
 
     def start(self) -> None:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from placegraph.runtime.geometry import rotation_angle_rad
-from placegraph.runtime.join import Join
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import End, Frame, Keyframe, LastKeyframe, Message, Pose, Segments
+from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Context, Node, NodeConfig
+from placegraph.runtime.vision.geometry import rotation_angle_rad
 
 
 class KeyframeConfig(NodeConfig):
@@ -35,16 +35,16 @@ class KeyframeNode(Node):
     """
 
     config_type = KeyframeConfig
-    takes = (Frame, Pose, Segments, End)
-    gives = (Keyframe, LastKeyframe)
+    inputs = (Frame, Pose, Segments, End)
+    outputs = (Keyframe, LastKeyframe)
     feedback = (Segments,)
     restartable: ClassVar[bool] = True
     config: KeyframeConfig
 
     def __init__(self, config: Any, context: Context) -> None:
         super().__init__(config, context)
-        self._join = Join(Frame, Pose)
-        self._last: tuple[int, NDArray[np.float64]] | None = None  # stamp and pose of the last keyframe
+        self._synchronizer = FrameSynchronizer(Frame, Pose)
+        self._last: tuple[int, F64] | None = None  # stamp and pose of the last keyframe
         self._in_flight: dict[int, int] = {}  # frame id to stamp
         self._chosen = 0
         self._last_keyframe_id = -1
@@ -72,8 +72,8 @@ class KeyframeNode(Node):
 
     def _joined(self, message: Message) -> tuple[Message, ...] | None:
         if isinstance(message, Frame) and not self.context.lossless:
-            self._join.forget_before(message.stamp_ns - round(self.config.lost_after_s * 1e9))
-        return self._join.add(message)
+            self._synchronizer.forget_before(message.stamp_ns - round(self.config.lost_after_s * 1e9))
+        return self._synchronizer.add(message)
 
     def _is_worth(self, frame: Frame, pose: Pose) -> bool:
         if not pose.trusted:

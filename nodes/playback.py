@@ -26,7 +26,7 @@ class Playback(Source):
     """Gives the recorded messages of its kinds, exact and in recorded order."""
 
     config_type: ClassVar[type[NodeConfig]] = PlaybackConfig
-    gives: tuple[type[Message], ...] = (Pose, Keyframe, LastKeyframe)
+    outputs: tuple[type[Message], ...] = (Pose, Keyframe, LastKeyframe)
 
     def __init__(self, config: Any, context: Context) -> None:
         super().__init__(config, context)
@@ -36,7 +36,7 @@ class Playback(Source):
                 raise ConfigError(f"[nodes.playback] kinds: no message {name!r}; there are: {', '.join(known)}")
         if len(set(config.kinds)) != len(config.kinds) or not config.kinds:
             raise ConfigError(f"[nodes.playback] kinds: expected each kind once, at least one: {list(config.kinds)}")
-        self.gives = tuple(known[name] for name in config.kinds)
+        self.outputs = tuple(known[name] for name in config.kinds)
 
     def is_lossless(self) -> bool:
         """A recording can wait."""
@@ -50,22 +50,22 @@ class Playback(Source):
         """
         path = Path(self.config.path)
         counts = kinds_in(path)
-        if Keyframe in self.gives:
+        if Keyframe in self.outputs:
             _require_keyframes(path, counts)
-        ends = LastKeyframe in self.gives and not counts.get("LastKeyframe", 0)
+        ends = LastKeyframe in self.outputs and not counts.get("LastKeyframe", 0)
         if ends and not self.config.incomplete:
             raise SourceError(
                 f"{path}: has no LastKeyframe: the recording was cut before its end. "
                 "Set `incomplete = true` in [nodes.playback] to end after its last keyframe"
             )
         last, keyframes = LastKeyframe(frame_id=-1, stamp_ns=0, keyframes=0), 0
-        for message in read(path, self.gives):
+        for message in read(path, self.outputs):
             if isinstance(message, Keyframe):
                 keyframes += 1
                 last = LastKeyframe(frame_id=message.frame_id, stamp_ns=message.stamp_ns, keyframes=keyframes)
             yield message
             if self.ending:  # told to stop early: what follows still gets its last keyframe
-                ends = LastKeyframe in self.gives and not isinstance(message, LastKeyframe)
+                ends = LastKeyframe in self.outputs and not isinstance(message, LastKeyframe)
                 break
         if ends:
             yield last

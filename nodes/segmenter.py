@@ -11,8 +11,8 @@ from pydantic import Field
 from placegraph.models_onnx import Segmenter
 from placegraph.models_onnx.load import load, wrong_task
 from placegraph.models_onnx.segments import pack_segments
-from placegraph.runtime.join import Join
 from placegraph.runtime.messages import Detections, Keyframe, Message, Segments
+from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Node, NodeConfig
 
 
@@ -31,8 +31,8 @@ class SegmenterNode(Node):
     """
 
     config_type: ClassVar[type[NodeConfig]] = SegmenterConfig
-    takes = (Keyframe, Detections)
-    gives = (Segments,)
+    inputs = (Keyframe, Detections)
+    outputs = (Segments,)
     restartable: ClassVar[bool] = True
 
     def start(self) -> None:
@@ -46,11 +46,11 @@ class SegmenterNode(Node):
         if not isinstance(model, Segmenter):
             raise wrong_task("segmenter", self.config.model, model, "give masks for boxes")
         self._model: Segmenter = model
-        self._join = Join(Keyframe, Detections)
+        self._synchronizer = FrameSynchronizer(Keyframe, Detections)
 
     def step(self, message: Message) -> Sequence[Message]:
         """When both a Keyframe and its Detections are there, give its Segments, in the order of the boxes."""
-        match self._join.add(message):
+        match self._synchronizer.add(message):
             case (Keyframe() as keyframe, Detections() as detections):
                 return [self._segment(keyframe, detections)]
             case _:

@@ -29,8 +29,8 @@ class TaggerNode(Node):
     """
 
     config_type: ClassVar[type[NodeConfig]] = TaggerConfig
-    takes = (Keyframe,)
-    gives = (Tags,)
+    inputs = (Keyframe,)
+    outputs = (Tags,)
     restartable: ClassVar[bool] = True
 
     def start(self) -> None:

@@ -12,13 +12,13 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from placegraph.runtime.bus import BusConfig
+from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Health, Message, Question
 from placegraph.runtime.node import Context, Node, Source, build_node
 
 # Given by the shells themselves, not by a node: requests from outside, and every process's own report.
-GIVEN_BY_SHELL: tuple[type[Message], ...] = (Health, Question)
+PRODUCED_BY_SHELL: tuple[type[Message], ...] = (Health, Question)
 
 
 class RunSettings(BaseModel):
@@ -92,19 +92,19 @@ class Dataflow:
         """The one node that takes nothing."""
         return next(node for node in self.nodes.values() if isinstance(node, Source))
 
-    def giver(self, kind: type[Message]) -> str | None:
+    def producer(self, kind: type[Message]) -> str | None:
         """Name of the node that gives a kind."""
-        return next((name for name, node in self.nodes.items() if kind in node.gives), None)
+        return next((name for name, node in self.nodes.items() if kind in node.outputs), None)
 
-    def takers(self, kind: type[Message]) -> list[str]:
+    def consumers(self, kind: type[Message]) -> list[str]:
         """Names of the nodes that take a kind, in order."""
-        return [name for name, node in self.nodes.items() if kind in node.takes]
+        return [name for name, node in self.nodes.items() if kind in node.inputs]
 
-    def waited_for(self, name: str) -> dict[str, list[str]]:
+    def awaited_consumers(self, name: str) -> dict[str, list[str]]:
         """For each kind a node gives: the takers it waits for."""
         return {
-            kind.__name__: [t for t in self.takers(kind) if kind not in self.nodes[t].feedback]
-            for kind in self.nodes[name].gives
+            kind.__name__: [t for t in self.consumers(kind) if kind not in self.nodes[t].feedback]
+            for kind in self.nodes[name].outputs
         }
 
 
@@ -121,7 +121,7 @@ def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
         raise ConfigError(f"expected one source (camera or playback), found {', '.join(sources) or 'none'}")
     source = nodes[sources[0]]
     assert isinstance(source, Source)
-    given = sorted({kind.__name__ for node in nodes.values() for kind in node.gives})
+    given = sorted({kind.__name__ for node in nodes.values() for kind in node.outputs})
     context = base.model_copy(update={"lossless": source.is_lossless(), "given": tuple(given)})
     source.context = context
     # once more, now that it is known what is given: some nodes take a kind only if another gives it
@@ -137,9 +137,9 @@ def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
 def _order(nodes: dict[str, Node]) -> list[str]:
     feeds: dict[str, set[str]] = {name: set() for name in sorted(nodes)}
     for name, node in nodes.items():
-        for kind in node.takes:
+        for kind in node.inputs:
             if kind not in node.feedback:
-                feeds[name] |= {giver for giver, other in nodes.items() if kind in other.gives}
+                feeds[name] |= {producer for producer, other in nodes.items() if kind in other.outputs}
     try:
         return list(graphlib.TopologicalSorter(feeds).static_order())
     except graphlib.CycleError as error:
@@ -149,12 +149,12 @@ def _order(nodes: dict[str, Node]) -> list[str]:
 
 
 def _check_wiring(dataflow: Dataflow) -> None:
-    for kind in {kind for node in dataflow.nodes.values() for kind in node.gives}:
-        givers = [name for name, node in dataflow.nodes.items() if kind in node.gives]
-        if len(givers) > 1:
-            raise ConfigError(f"{kind.__name__} is given by {' and '.join(givers)}: switch one of them off")
+    for kind in {kind for node in dataflow.nodes.values() for kind in node.outputs}:
+        producers = [name for name, node in dataflow.nodes.items() if kind in node.outputs]
+        if len(producers) > 1:
+            raise ConfigError(f"{kind.__name__} is given by {' and '.join(producers)}: switch one of them off")
     for name, node in dataflow.nodes.items():
-        for kind in node.takes:
-            needed = kind not in GIVEN_BY_SHELL and kind not in node.feedback and kind not in node.optional
-            if needed and dataflow.giver(kind) is None:
+        for kind in node.inputs:
+            needed = kind not in PRODUCED_BY_SHELL and kind not in node.feedback and kind not in node.optional
+            if needed and dataflow.producer(kind) is None:
                 raise ConfigError(f"{name} takes {kind.__name__}, which nothing gives")

@@ -60,7 +60,7 @@ class Inline:
             if delivered > CASCADE_LIMIT:
                 kinds = sorted({type(m).__name__ for m in waiting} | {type(current).__name__})
                 raise ConfigError(f"one message caused more than {CASCADE_LIMIT} others, last {', '.join(kinds)}")
-            for name in self._dataflow.takers(type(current)):
+            for name in self._dataflow.consumers(type(current)):
                 node = self._dataflow.nodes[name]
                 if isinstance(node, Source):
                     continue

@@ -14,13 +14,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from placegraph.runtime.bus import Bus
-from placegraph.runtime.codec import decode
+from placegraph.runtime.bus.session import Bus
 from placegraph.runtime.config import Dataflow
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.messages import Message
+from placegraph.runtime.messages.codec import decode
+from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.process import ProcessSpec
-from placegraph.runtime.topics import TOPICS
 
 logger = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ LOG_TAIL_LINES = 12
 class RestartBudget:
     """Delays of a node's restarts: 0.5 s doubling to 8 s, at most five within a minute."""
 
-    FIRST_S, LONGEST_S, MOST, PERIOD_S = 0.5, 8.0, 5, 60.0
+    FIRST_S, LONGEST_S, MAX, PERIOD_S = 0.5, 8.0, 5, 60.0
 
     def __init__(self) -> None:
         self._times: deque[float] = deque()
@@ -43,7 +43,7 @@ class RestartBudget:
         """Seconds to wait before the next start, or None when the budget is spent."""
         while self._times and now_s - self._times[0] > self.PERIOD_S:
             self._times.popleft()
-        if len(self._times) >= self.MOST:
+        if len(self._times) >= self.MAX:
             return None
         self._times.append(now_s)
         return float(min(self.FIRST_S * 2 ** (len(self._times) - 1), self.LONGEST_S))
@@ -104,7 +104,7 @@ class Launcher:
                 self._raise_if_dead(name)
             delay_s = self._budgets[name].next_delay_s(time.monotonic())
             if delay_s is None:
-                raise PlacegraphError(f"{name} failed {RestartBudget.MOST} times within a minute{self._log_tail(name)}")
+                raise PlacegraphError(f"{name} failed {RestartBudget.MAX} times within a minute{self._log_tail(name)}")
             logger.warning("%s ended with status %d; starting it again in %.1f s", name, process.returncode, delay_s)
             self._restart_at[name] = time.monotonic() + delay_s
         for name in [name for name, at in self._restart_at.items() if time.monotonic() >= at]:
@@ -159,7 +159,7 @@ class Launcher:
             settings=config.nodes[name],
             context=self._dataflow.context,
             bus=config.bus,
-            takers=self._dataflow.waited_for(name),
+            consumers=self._dataflow.awaited_consumers(name),
             question_timeout_s=config.run.question_timeout_s,
             log_level=config.run.log_level,
         )

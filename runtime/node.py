@@ -8,10 +8,9 @@ import pkgutil
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Message
 
@@ -33,8 +32,8 @@ class Node:
     """
 
     config_type: ClassVar[type[NodeConfig]] = NodeConfig
-    takes: tuple[type[Message], ...] = ()  # on the class; set in __init__ only where it depends on settings
-    gives: tuple[type[Message], ...] = ()
+    inputs: tuple[type[Message], ...] = ()  # on the class; set in __init__ only where it depends on settings
+    outputs: tuple[type[Message], ...] = ()
     # Kinds taken from further down the dataflow. A giver does not wait for this node to take them, which is what keeps
     # a cycle from blocking; without these edges the dataflow has no cycle (checked when it is built).
     feedback: ClassVar[tuple[type[Message], ...]] = ()
@@ -67,7 +66,7 @@ class Source(Node):
         """Whether every message must arrive (data sets, recordings) or the newest wins (a live camera)."""
         raise NotImplementedError
 
-    def given_poses(self) -> dict[int, NDArray[np.float64]] | None:
+    def given_poses(self) -> dict[int, F64] | None:
         """stamp_ns to (4, 4) world_from_camera that the data bring, for evaluation; None when they bring none."""
         return None
 

@@ -24,15 +24,15 @@ import psutil
 from pydantic import BaseModel, ConfigDict
 
 from placegraph.runtime import log, messages
-from placegraph.runtime.bus import Bus, BusConfig
-from placegraph.runtime.codec import decode, encode
-from placegraph.runtime.desk import Desk
+from placegraph.runtime.bus.flow_control import CreditWindow, Envelope, Inbox
+from placegraph.runtime.bus.session import Bus, BusConfig
 from placegraph.runtime.errors import PlacegraphError
-from placegraph.runtime.flow import Inbox, Parcel, Window
 from placegraph.runtime.health import StepStats
 from placegraph.runtime.messages import Answer, Health, Message, Question
+from placegraph.runtime.messages.codec import decode, encode
+from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import Context, Node, Source, build_node
-from placegraph.runtime.topics import TOPICS
+from placegraph.runtime.query.query_server import QueryServer
 
 logger = logging.getLogger(__name__)
 
@@ -49,7 +49,7 @@ class ProcessSpec(BaseModel):
     settings: dict[str, Any]
     context: Context
     bus: BusConfig
-    takers: dict[str, list[str]]  # kind given -> nodes to wait for
+    consumers: dict[str, list[str]]  # kind given -> nodes to wait for
     question_timeout_s: float
     log_level: str = "INFO"
 
@@ -59,17 +59,17 @@ class Process:
 
     def __init__(self, spec: ProcessSpec, node: Node) -> None:
         self.spec, self.node = spec, node
-        newest = {} if spec.context.lossless else {k: TOPICS[k].newest for k in node.takes if TOPICS[k].newest}
+        newest = {} if spec.context.lossless else {k: TOPICS[k].newest for k in node.inputs if TOPICS[k].newest}
         self.inbox = Inbox(newest)
         self.stats = StepStats(spec.node)
         self.started, self.aborting = threading.Event(), threading.Event()
         self._ended = threading.Event()
-        self.windows: dict[type[Message], Window] = {}
+        self.windows: dict[type[Message], CreditWindow] = {}
         self._puts: dict[type[Message], Any] = {}
         self._sequences: dict[type[Message], int] = {}
         self._expected: dict[type[Message], int] = {}
-        self._desk = Desk(self._forward, spec.question_timeout_s)
-        self._recent: deque[Parcel] = deque(maxlen=KEPT_FOR_CRASH)
+        self._query_server = QueryServer(self._forward, spec.question_timeout_s)
+        self._recent: deque[Envelope] = deque(maxlen=KEPT_FOR_CRASH)
 
     # --- wiring
 
@@ -77,25 +77,25 @@ class Process:
         """Declare publishers, subscribers and the token that says this process is ready."""
         self._receipt = bus.publisher("receipt", self.spec.node)
         serves = self.node.serves
-        given = {*self.node.gives, Health, *((serves[0],) if serves else ())}
+        given = {*self.node.outputs, Health, *((serves[0],) if serves else ())}
         for kind in sorted(given, key=lambda kind: kind.__name__):
             topic = TOPICS[kind]
             self._puts[kind] = bus.publisher("topic", topic.key)
             waits = not topic.newest or self.spec.context.lossless
-            if topic.window and waits and (takers := self.spec.takers.get(kind.__name__)):
-                self.windows[kind] = Window(topic.window, takers)
+            if topic.window and waits and (consumers := self.spec.consumers.get(kind.__name__)):
+                self.windows[kind] = CreditWindow(topic.window, consumers)
         bus.subscribe(self._on_control, "control")
         bus.subscribe(self._on_receipt, "receipt", "*")
         bus.watch_alive(self._on_alive)
-        for kind in self.node.takes:
+        for kind in self.node.inputs:
             if serves and kind is serves[0]:
-                bus.serve(self._desk.take, "ask")
+                bus.serve(self._query_server.take, "ask")
             else:
                 bus.subscribe(self._subscriber(kind), "topic", TOPICS[kind].key)
         bus.declare_alive(self.spec.node)
 
     def _subscriber(self, kind: type[Message]) -> Any:
-        return lambda key, payload, attachment: self.inbox.put(Parcel(kind, int.from_bytes(attachment), payload))
+        return lambda key, payload, attachment: self.inbox.put(Envelope(kind, int.from_bytes(attachment), payload))
 
     def _on_control(self, key: str, payload: bytes, attachment: bytes) -> None:
         if payload == b"start":
@@ -114,7 +114,7 @@ class Process:
             window.set_present(name, present)
 
     def _forward(self, number: int, question: Question) -> None:
-        self.inbox.put(Parcel(Question, number, encode(question)))
+        self.inbox.put(Envelope(Question, number, encode(question)))
 
     def stop(self) -> None:
         """Finish what has arrived, then end; a source ends as if there were no more to give."""
@@ -135,9 +135,9 @@ class Process:
         if isinstance(self.node, Source):
             self._run_source(self.node)
         while not self.inbox.drained and not self.aborting.is_set():
-            parcel = self.inbox.get(POLL_S)
-            if parcel is not None:
-                self._take(parcel)
+            envelope = self.inbox.get(POLL_S)
+            if envelope is not None:
+                self._take(envelope)
 
     def _run_source(self, source: Source) -> None:
         self.started.wait()
@@ -148,14 +148,14 @@ class Process:
                 return
             began = time.monotonic()
 
-    def _take(self, parcel: Parcel) -> None:
-        self._recent.append(parcel)
-        asked = self.node.serves is not None and parcel.kind is self.node.serves[0]
-        if asked and not self._desk.is_waiting(parcel.sequence):
+    def _take(self, envelope: Envelope) -> None:
+        self._recent.append(envelope)
+        asked = self.node.serves is not None and envelope.kind is self.node.serves[0]
+        if asked and not self._query_server.is_waiting(envelope.sequence):
             return
         if not asked:
-            self._check_order(parcel)
-        message = decode(parcel.kind, parcel.payload)
+            self._check_order(envelope)
+        message = decode(envelope.kind, envelope.payload)
         if asked:
             self._publish(message)
         began = time.monotonic()
@@ -168,24 +168,24 @@ class Process:
         for out in given:
             self._publish(out)
             if asked and isinstance(out, Answer):
-                self._desk.answer(parcel.sequence, out.json)
-        if not asked and parcel.kind not in self.node.feedback:
-            self._receipt(msgpack.packb([parcel.kind.__name__, parcel.sequence]), b"")
+                self._query_server.answer(envelope.sequence, out.json)
+        if not asked and envelope.kind not in self.node.feedback:
+            self._receipt(msgpack.packb([envelope.kind.__name__, envelope.sequence]), b"")
 
-    def _check_order(self, parcel: Parcel) -> None:
+    def _check_order(self, envelope: Envelope) -> None:
         """Every kind that must not be lost has gapless numbers; a gap in a replay would give another graph."""
-        lossless, kind = self.spec.context.lossless, parcel.kind
+        lossless, kind = self.spec.context.lossless, envelope.kind
         if kind is Health:  # every process gives it: its numbers run in parallel
             return
-        expected = self._expected.get(kind, 1 if lossless else parcel.sequence)
-        self._expected[kind] = parcel.sequence + 1
-        lost = parcel.sequence - expected
+        expected = self._expected.get(kind, 1 if lossless else envelope.sequence)
+        self._expected[kind] = envelope.sequence + 1
+        lost = envelope.sequence - expected
         if lost and lossless:
             raise PlacegraphError(
-                f"{lost} {kind.__name__} lost before number {parcel.sequence}: a replay must not lose any"
+                f"{lost} {kind.__name__} lost before number {envelope.sequence}: a replay must not lose any"
             )
         if lost > 0 and not TOPICS[kind].newest:
-            logger.warning("%d %s lost before number %d", lost, kind.__name__, parcel.sequence)
+            logger.warning("%d %s lost before number %d", lost, kind.__name__, envelope.sequence)
 
     def _publish(self, message: Message) -> bool:
         """Send when the takers have room; False when told to abort before they have."""
@@ -205,8 +205,8 @@ class Process:
         if not self.spec.context.out_dir:
             return
         path = Path(self.spec.context.out_dir) / "crash" / f"{self.spec.node}.rec"
-        parcels = [[p.kind.__name__, p.payload] for p in self._recent]
-        record = [self.spec.model_dump_json(), trace, parcels]
+        envelopes = [[p.kind.__name__, p.payload] for p in self._recent]
+        record = [self.spec.model_dump_json(), trace, envelopes]
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(msgpack.packb(record))
@@ -224,7 +224,7 @@ class Process:
 
     def end(self) -> None:
         """Let `report_health` give its last report and return, and let nobody wait for an answer."""
-        self._desk.close(f"the {self.spec.node} node ended")
+        self._query_server.close(f"the {self.spec.node} node ended")
         self._ended.set()
 
     def _publish_health(self, elapsed_s: float, memory_mb: float) -> None:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from rerun.chunk import Chunk, LazyChunkStream, RrdReader
 from rerun.error_utils import RerunWarning
 
+from placegraph.runtime.arrays import U8
 from placegraph.runtime.errors import ConfigError, SchemaError, SourceError
 from placegraph.runtime.messages import ArraySpec, Message, all_kinds
 
@@ -217,7 +218,7 @@ def _to_png(image: NDArray[Any], where: str) -> bytes:
     return bytes(cv2.imencode(".png", bgr, PNG)[1].data)
 
 
-def _from_png(data: NDArray[np.uint8], where: str) -> NDArray[Any]:
+def _from_png(data: U8, where: str) -> NDArray[Any]:
     image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if image is None:
         raise SchemaError(f"{where}: damaged image")

@@ -5,7 +5,7 @@ import numpy as np
 import psutil
 import pytest
 
-from placegraph.runtime.geometry import transform
+from placegraph.runtime.vision.geometry import transform
 
 INTRINSICS = np.array([260.0, 260.0, 160.0, 120.0])
 SHAPE = (240, 320)

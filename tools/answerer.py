@@ -14,9 +14,9 @@ from typing import Any
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Answer, Graph, Question
 from placegraph.runtime.node import Context, Node, build_node
-from placegraph.runtime.object_list import OwnId
-from placegraph.runtime.reply import finished
-from placegraph.runtime.scene import load_scene
+from placegraph.runtime.query.reply import finished
+from placegraph.runtime.scene_graph.object_list import OwnId
+from placegraph.runtime.scene_graph.object_list_import import load_scene
 from placegraph.tools.map_folder import RUN, find_graph, read_config
 
 KEPT = 4  # files whose graphs are kept: lines about one scene mostly follow each other

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from placegraph.runtime.bus import Bus, BusConfig
+from placegraph.runtime.bus.session import Bus, BusConfig
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.question import make_question
+from placegraph.runtime.query.request import make_question
 from placegraph.tools.answerer import Answerer
 from placegraph.tools.batch import Batch, answer_all
 

@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.progress import track
 
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError, SchemaError
-from placegraph.runtime.object_list import OwnId
-from placegraph.runtime.question import MAX_BYTES, make_question
-from placegraph.runtime.reply import refusal
+from placegraph.runtime.query.reply import refusal
+from placegraph.runtime.query.request import MAX_BYTES, make_question
+from placegraph.runtime.scene_graph.object_list import OwnId
 from placegraph.tools.answerer import Answerer
 
 logger = logging.getLogger(__name__)

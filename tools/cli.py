@@ -29,8 +29,8 @@ from placegraph.tools import (
 )
 from placegraph.tools.evaluate.grounding_table import evaluate_grounding
 from placegraph.tools.evaluate.networks import networks
-from placegraph.tools.house.command import house
-from placegraph.tools.train import command as train
+from placegraph.tools.simulator.command import house
+from placegraph.tools.training import command as train
 
 app = typer.Typer(
     help="Hierarchical 3D scene graphs from RGB-D frames, and answers to questions about them.",

@@ -6,13 +6,9 @@ import dataclasses
 from bisect import bisect_right
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from placegraph.runtime.geometry import inverse, nearest_rigid
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Correction, Pose
-
-F64 = NDArray[np.float64]
+from placegraph.runtime.vision.geometry import inverse, nearest_rigid
 
 
 class CorrectedKeyframes:

@@ -69,7 +69,7 @@ def _packages() -> list[Finding]:
 
 
 def _bus() -> Finding:
-    from placegraph.runtime.bus import Bus, BusConfig, free_endpoint
+    from placegraph.runtime.bus.session import Bus, BusConfig, free_endpoint
     from placegraph.runtime.errors import ConfigError
 
     config = BusConfig(endpoint=free_endpoint())
@@ -81,8 +81,8 @@ def _bus() -> Finding:
 
 
 def _language_model() -> Finding:
-    from placegraph.nodes.grounding.llm import default_model_path
     from placegraph.runtime.errors import ModelError
+    from placegraph.runtime.language.language_model import default_model_path
 
     try:
         path = default_model_path()

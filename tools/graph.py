@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from placegraph.runtime.messages import Message
+from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import NODES, Node, available, plugin
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.runtime.topics import TOPICS
 from placegraph.tools.map_folder import find_graph
 
 
@@ -37,8 +37,8 @@ def node_types() -> dict[str, type[Node]]:
     waiting = sorted(types)
     while waiting:
         for name in waiting:
-            needed = {k for k in types[name].takes if k not in types[name].feedback}
-            if not any(k in types[other].gives for k in needed for other in waiting if other != name):
+            needed = {k for k in types[name].inputs if k not in types[name].feedback}
+            if not any(k in types[other].outputs for k in needed for other in waiting if other != name):
                 break
         order.append(name)
         waiting.remove(name)
@@ -52,7 +52,7 @@ def _names(kinds: tuple[type[Message], ...], feedback: tuple[type[Message], ...]
 def dataflow_table() -> str:
     """Markdown table of the nodes."""
     rows = ["| node | takes | gives |", "|---|---|---|"]
-    rows += [f"| {n} | {_names(t.takes, t.feedback)} | {_names(t.gives)} |" for n, t in node_types().items()]
+    rows += [f"| {n} | {_names(t.inputs, t.feedback)} | {_names(t.outputs)} |" for n, t in node_types().items()]
     return "\n".join(rows)
 
 

@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from placegraph.runtime.arrays import F32, F64, U8
 from placegraph.runtime.config import Dataflow, RunConfig
 from placegraph.runtime.errors import ConfigError, SchemaError
-from placegraph.runtime.geometry import quaternion_xyzw
 from placegraph.runtime.messages import Correction, End, Graph, Map, Message, PlaceNames, Pose
 from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.runtime.vision.geometry import quaternion_xyzw
 from placegraph.tools.corrected import CorrectedKeyframes
 from placegraph.tools.ply import points_of, read_vertices, write_points
 
@@ -64,8 +64,8 @@ class Collector:
     """Keeps what the map folder needs out of the messages of a run."""
 
     def __init__(self, dataflow: Dataflow) -> None:
-        self._expects_graph = dataflow.giver(Graph) is not None
-        self._expects_names = dataflow.giver(PlaceNames) is not None
+        self._expects_graph = dataflow.producer(Graph) is not None
+        self._expects_names = dataflow.producer(PlaceNames) is not None
         self.ended = False
         self._frames_of_source = 0
         self.clock = Clock()
@@ -208,9 +208,9 @@ def write_trajectory(path: Path, poses: list[Pose]) -> None:
     path.write_text("# seconds tx ty tz qx qy qz qw\n" + "".join(line + "\n" for line in lines))
 
 
-def read_trajectory(path: Path) -> dict[int, NDArray[np.float64]]:
+def read_trajectory(path: Path) -> dict[int, F64]:
     """TUM file to stamp_ns -> (3,) position in metres; raises SchemaError naming the line."""
-    found: dict[int, NDArray[np.float64]] = {}
+    found: dict[int, F64] = {}
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
@@ -232,7 +232,7 @@ def read_trajectory(path: Path) -> dict[int, NDArray[np.float64]]:
     return found
 
 
-def read_cloud(folder: Path) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+def read_cloud(folder: Path) -> tuple[F32, U8]:
     """Points (P, 3) in metres, world frame, and colours (P, 3) of a map folder; raises SchemaError."""
     path = folder / CLOUD
     rows = read_vertices(path)
@@ -242,7 +242,7 @@ def read_cloud(folder: Path) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     return points_of(rows, path).astype(np.float32), rgb.astype(np.uint8)
 
 
-def read_object_clouds(folder: Path) -> dict[str, NDArray[np.float32]]:
+def read_object_clouds(folder: Path) -> dict[str, F32]:
     """Points (N, 3) in metres, world frame, of each object of a map folder by its id; raises SchemaError."""
     path = folder / OBJECTS
     rows = read_vertices(path)

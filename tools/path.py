@@ -10,9 +10,9 @@ import numpy as np
 import typer
 
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.place_graph import rounded
-from placegraph.runtime.route import Route, find_route
 from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph.place_graph import rounded
+from placegraph.runtime.scene_graph.route import Route, find_route
 from placegraph.tools.map_folder import find_graph
 
 LAYERS = ("room", "location", "object")  # a name is looked for in this order

@@ -12,15 +12,13 @@ from typing import Annotated, Any
 import cv2
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from placegraph.nodes.camera import detect
+from placegraph.runtime.arrays import U8, Bool
 from placegraph.runtime.config import read
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import Frame, Keyframe, Message, Segments, Tags
 from placegraph.runtime.node import Context, Node, build_node
-
-U8 = NDArray[np.uint8]
 
 NETWORKS = ("tagger", "detector", "segmenter", "instances")  # in the order of their messages
 WIDTH_PX = 640  # of one picture on the sheet
@@ -62,7 +60,7 @@ def see(frame: Frame, nodes: Sequence[Node]) -> list[Message]:
     given: list[Message] = [Keyframe.of(frame, np.eye(4))]
     for node in nodes:
         for message in list(given):
-            if type(message) in node.takes:
+            if type(message) in node.inputs:
                 given += node.step(message)
     return given[1:]
 
@@ -101,7 +99,7 @@ def sheet(pictures: Sequence[U8]) -> U8:
     return np.concatenate([np.concatenate(padded[i : i + columns], axis=1) for i in range(0, len(padded), columns)])
 
 
-def _draw_one(picture: U8, mask: NDArray[np.bool_], box: list[int], name: str, score: Any) -> None:
+def _draw_one(picture: U8, mask: Bool, box: list[int], name: str, score: Any) -> None:
     x0, y0, x1, y1 = box
     hue = (zlib.crc32(name.encode()) & 0xFFFF) / 0x10000
     color = tuple(round(255 * part) for part in colorsys.hsv_to_rgb(hue, 0.8, 1.0))

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
-
-F64 = NDArray[np.float64]
 
 TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"},

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from placegraph.runtime.config import Dataflow
 from placegraph.runtime.messages import Health
-from placegraph.runtime.topics import TOPICS
+from placegraph.runtime.messages.topics import TOPICS
 
 PLAIN_PERIOD_S = 5.0  # without a terminal: a line this often
 MIN_RATE_SHARE = 0.9  # of a topic's declared rate; below it a live node is marked
@@ -74,7 +74,7 @@ class Progress:
     def _is_slow(self, name: str, health: Health) -> bool:
         if self._dataflow.context.lossless:  # a replay goes as fast as it can; no rate is expected of it
             return False
-        wanted = max((TOPICS[kind].rate_hz for kind in self._dataflow.nodes[name].gives), default=0.0)
+        wanted = max((TOPICS[kind].rate_hz for kind in self._dataflow.nodes[name].outputs), default=0.0)
         return health.rate_hz < MIN_RATE_SHARE * wanted
 
     def print_summary(self, summary: dict[str, Any]) -> None:

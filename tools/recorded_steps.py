@@ -15,11 +15,11 @@ import msgpack
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.nodes.grounding.llm import LanguageModel, Reply
 from placegraph.runtime import messages as m
-from placegraph.runtime.codec import decode, encode
 from placegraph.runtime.errors import PlacegraphError, SchemaError
+from placegraph.runtime.language.language_model import LanguageModel, Reply
 from placegraph.runtime.messages import Message
+from placegraph.runtime.messages.codec import decode, encode
 from placegraph.runtime.node import Context, build_node
 
 REMAKE = "`placegraph references --update` remakes it"
@@ -28,7 +28,7 @@ REMAKE = "`placegraph references --update` remakes it"
 # can differ between machines. KISS-ICP stops when a step is under 1e-4, and one step more or less moves a pose so far.
 TOLERANCE = 1e-3  # m, px, rad, shares
 JSON_LENGTH_TOLERANCE_M = 2e-3  # the canonical JSON rounds to 1 mm, which can add one step to TOLERANCE
-MOST_REPORTED = 5  # of one node
+MAX_REPORTED = 5  # of one node
 
 
 @dataclass(frozen=True, repr=False)
@@ -93,7 +93,7 @@ def language_model_replies(replies: dict[str, Any], ask: bool) -> Iterator[None]
 
 
 def differences(reference: Reference, name: str, **changed: Any) -> list[str]:
-    """Step a fresh node through its reference; where what it gives is not what it gave, at most MOST_REPORTED lines.
+    """Step a fresh node through its reference; where what it gives is not what it gave, at most MAX_REPORTED lines.
 
     `changed` settings replace the recorded ones. An error of ours is a difference; it ends the node's steps.
     """
@@ -107,13 +107,13 @@ def differences(reference: Reference, name: str, **changed: Any) -> list[str]:
                 message = reference.messages[taken]
                 where = f"{name}: {type(message).__name__} of frame {message.frame_id}"
                 found += _step_differences(where, [reference.messages[i] for i in given], node.step(message))
-                if len(found) >= MOST_REPORTED:
+                if len(found) >= MAX_REPORTED:
                     break
         except PlacegraphError as error:
             found.append(f"{name}: {type(error).__name__}: {error}")
         finally:
             node.stop()
-    return found[:MOST_REPORTED]
+    return found[:MAX_REPORTED]
 
 
 def _step_differences(where: str, expected: Sequence[Message], given: Sequence[Message]) -> list[str]:

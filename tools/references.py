@@ -32,7 +32,7 @@ WALK: dict[str, dict[str, Any]] = {
     "pose_graph": {  # so that it closes loops within a few steps of small images
         "pull_m": 0.0,
         "pull_rad": 0.0,
-        "loops": {"skip": 1, "apart": 1, "features": {"least_inliers": 10}},
+        "loops": {"skip": 1, "apart": 1, "features": {"min_inliers": 10}},
     },
 }
 HOUSE: dict[str, dict[str, Any]] = {
@@ -56,7 +56,7 @@ class _Tap(Node):
 
     def __init__(self, inner: Node) -> None:
         super().__init__(inner.config, inner.context)
-        self.takes, self.gives, self._inner = inner.takes, inner.gives, inner
+        self.inputs, self.outputs, self._inner = inner.inputs, inner.outputs, inner
         self.start, self.stop = inner.start, inner.stop  # type: ignore[method-assign]
         self.seen: list[tuple[Message, list[Message]]] = []
 

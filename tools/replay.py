@@ -11,9 +11,9 @@ import typer
 from pydantic import ValidationError
 
 from placegraph.runtime import log, messages
-from placegraph.runtime.codec import decode
 from placegraph.runtime.config import RunConfig, read
 from placegraph.runtime.errors import ConfigError, SchemaError, SourceError
+from placegraph.runtime.messages.codec import decode
 from placegraph.runtime.node import build_node
 from placegraph.runtime.process import ProcessSpec
 from placegraph.tools.map_folder import RUN, read_config
@@ -74,8 +74,8 @@ def _read_crash(path: Path) -> tuple[ProcessSpec, str, list[messages.Message]]:
     """What the shell wrote of a node's end: its spec, the traceback, and the messages that led to it."""
     kinds = {kind.__name__: kind for kind in messages.all_kinds()}
     try:
-        spec, trace, parcels = msgpack.unpackb(path.read_bytes())
-        kept = [decode(kinds[name], payload) for name, payload in parcels]
+        spec, trace, envelopes = msgpack.unpackb(path.read_bytes())
+        kept = [decode(kinds[name], payload) for name, payload in envelopes]
         return ProcessSpec.model_validate_json(spec), str(trace), kept
     except OSError as error:
         raise SchemaError(f"{path}: cannot read: {error.strerror}") from None

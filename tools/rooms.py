@@ -11,16 +11,14 @@ import cv2
 import numpy as np
 import typer
 import yaml
-from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
 from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, areas_of, segment_rooms, walls_of_plan
+from placegraph.runtime.arrays import Bool
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.scan import FloorRooms, floors_of_scan, read_scan
 
-Bools = NDArray[np.bool_]
-
-MOST_ROOMS = np.iinfo(np.uint16).max
+MAX_ROOMS = np.iinfo(np.uint16).max
 
 
 class MapFile(BaseModel, frozen=True, extra="ignore"):
@@ -38,8 +36,8 @@ class MapFile(BaseModel, frozen=True, extra="ignore"):
 class OccupancyMap:
     """Bool images, row 0 at the top as in the file (what is neither is unknown), and where they lie."""
 
-    occupied: Bools
-    free: Bools
+    occupied: Bool
+    free: Bool
     resolution: float
     origin: tuple[float, float]
 
@@ -131,7 +129,7 @@ def _write_floors(source: Path, out: Path, resolution: float | None) -> list[tup
 
 
 def _write_labels(out: Path, source: Path, grid: Grid, found: list[RoomArea]) -> None:
-    if len(found) > MOST_ROOMS:
+    if len(found) > MAX_ROOMS:
         raise SourceError(f"{source}: {len(found)} rooms do not fit a 16 bit image")
     labels = np.zeros(grid.shape, np.uint16)
     for number, room in enumerate(found, 1):

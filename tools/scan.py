@@ -10,21 +10,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floors
 from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, find_rooms
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.ply import points_of, read_vertices
-
-F64 = NDArray[np.float64]
 
 VOXEL_M = 0.05  # of the map's cloud, METHOD section 2
 COLUMN_M = 0.2  # plan cells in which surfaces lie above each other: wide enough for a thin scan to show a ceiling
 EYE_M = 1.2  # above what is stood on: midway in the heights that a camera may have (FloorConfig)
 LOWEST_PERCENT = 1.0  # of the places to stand; fewer and lower ones are noise
 LARGEST_M = 500.0  # more is no building, or not in metres
-MOST_CELLS = 10_000  # a side: label images of 10^8 pixels
+MAX_CELLS = 10_000  # a side: label images of 10^8 pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +62,8 @@ def floors_of_scan(xyz: F64, cell_m: float) -> list[FloorRooms]:
     if not (cell_m > 0 and np.isfinite(cell_m)):
         raise ConfigError(f"--resolution: {cell_m} metres a pixel is not a positive length")
     size_m = float(np.ptp(xyz, axis=0).max())
-    if size_m > MOST_CELLS * cell_m:
-        raise ConfigError(f"--resolution: {size_m:.1f} m in pixels of {cell_m} m are more than {MOST_CELLS} a side")
+    if size_m > MAX_CELLS * cell_m:
+        raise ConfigError(f"--resolution: {size_m:.1f} m in pixels of {cell_m} m are more than {MAX_CELLS} a side")
     config, floor_config = RoomConfig(cell_m=cell_m), FloorConfig()
     xyz = thinned(xyz, min(VOXEL_M, cell_m))
     eyes, nothing = standpoints(xyz, floor_config), np.zeros((0, 3))

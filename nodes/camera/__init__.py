@@ -10,15 +10,12 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import End, Frame, Message
 from placegraph.runtime.node import Context, NodeConfig, Source, available, plugin
-
-F64 = NDArray[np.float64]
 
 # Devices are named, never guessed from a path: their libraries are optional and slow to import.
 DEVICES = ("oak",)
@@ -62,7 +59,7 @@ class Camera(Source):
     """Gives every frame of one source, in order, and then End."""
 
     config_type = CameraConfig
-    gives = (Frame, End)
+    outputs = (Frame, End)
 
     def __init__(self, config: CameraConfig, context: Context) -> None:
         super().__init__(config, context)

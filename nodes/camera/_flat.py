@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-F64 = NDArray[np.float64]
+from placegraph.runtime.arrays import F64
 
 Span = tuple[float, float, float, float, float, float]  # x y z of the one corner, x y z of the other
 Color = tuple[int, int, int]

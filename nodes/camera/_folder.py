@@ -11,12 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.runtime.geometry import is_rigid
-
-F64 = NDArray[np.float64]
-U8 = NDArray[np.uint8]
-U16 = NDArray[np.uint16]
+from placegraph.runtime.vision.geometry import is_rigid
 
 NO_POSE = np.full((4, 4), np.nan)
 NO_UP = np.full(3, np.nan)

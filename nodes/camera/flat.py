@@ -16,13 +16,8 @@ from pydantic import Field
 
 from placegraph.nodes.camera import _flat as scene
 from placegraph.nodes.camera._folder import SourceSettings, read_settings
+from placegraph.runtime.arrays import F32, F64, I64, U8, U16
 from placegraph.runtime.messages import Frame
-
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-U8 = NDArray[np.uint8]
-U16 = NDArray[np.uint16]
-I64 = NDArray[np.int64]
 
 FOCAL_PER_WIDTH = 0.7  # 71 degrees across, near the 69 of an OAK-D's colour camera
 MIN_RANGE_M, MAX_RANGE_M = 0.3, 6.0  # readings outside are dropped, as small stereo cameras do

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.camera._folder import (
@@ -32,10 +31,9 @@ from placegraph.nodes.camera._folder import (
     read_pose,
     read_settings,
 )
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.messages import Frame
-
-F64 = NDArray[np.float64]
 
 IMAGE, POSE = re.compile(r".+[_-](\d{6})\.png"), re.compile(r".+[_-](\d{6})\.txt")
 

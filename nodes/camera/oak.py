@@ -16,7 +16,6 @@ from typing import Any, ClassVar
 import cv2
 import depthai as dai
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.camera._folder import (
@@ -27,12 +26,9 @@ from placegraph.nodes.camera._folder import (
     check_intrinsics,
     read_settings,
 )
+from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.messages import Frame
-
-F64 = NDArray[np.float64]
-U8 = NDArray[np.uint8]
-U16 = NDArray[np.uint16]
 
 COLOR_SOCKET = dai.CameraBoardSocket.CAM_A
 SILENCE_S = 5.0  # no frame for so long: the camera is lost

@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.runtime.messages import F64, Frame
+from placegraph.runtime.messages import Frame
 from placegraph.runtime.recording import kinds_in, read
 
 

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from placegraph.nodes.camera._folder import (
@@ -27,11 +26,10 @@ from placegraph.nodes.camera._folder import (
     read_settings,
     read_text,
 )
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
-from placegraph.runtime.geometry import is_rigid
 from placegraph.runtime.messages import Frame
-
-F64 = NDArray[np.float64]
+from placegraph.runtime.vision.geometry import is_rigid
 
 COLOR, DEPTH = re.compile(r"frame(\d+)\.jpg"), re.compile(r"depth(\d+)\.png")
 CAMERA, TRACK = "cam_params.json", "traj.txt"

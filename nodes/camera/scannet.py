@@ -21,7 +21,6 @@ from typing import Any, ClassVar
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.camera._folder import (
@@ -35,11 +34,9 @@ from placegraph.nodes.camera._folder import (
     read_pose,
     read_settings,
 )
+from placegraph.runtime.arrays import F64, U8
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.messages import Frame
-
-F64 = NDArray[np.float64]
-U8 = NDArray[np.uint8]
 
 COLOR, DEPTH, POSE = re.compile(r"(\d+)\.jpg"), re.compile(r"(\d+)\.png"), re.compile(r"(\d+)\.txt")
 # Fields of view of colour and depth are within some percent of each other. SensReader's image_size shrinks images but

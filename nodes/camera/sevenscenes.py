@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.camera._folder import (
@@ -27,10 +26,9 @@ from placegraph.nodes.camera._folder import (
     read_pose,
     read_settings,
 )
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.messages import Frame
-
-F64 = NDArray[np.float64]
 
 FRAME = re.compile(r"frame-(\d+)\.color\.(jpg|png)")
 NO_READING = 65535  # the data set's value for "no depth", beside 0

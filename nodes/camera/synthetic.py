@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.camera._folder import SourceSettings, read_settings
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Frame
 from placegraph.runtime.node import plugin
-
-F64 = NDArray[np.float64]
 
 DEPTH_UNIT_M = 1 / 5000  # as in the folders that `placegraph house` writes
 
@@ -42,8 +40,8 @@ class Synthetic:
         self.settings = read_settings(Settings, settings)
         # By name, as a plug-in: the generator is a tool, which a node must not import, and it needs libraries (ray
         # casting) that no other node needs. Loaded here so that a missing one is told before the run starts.
-        plugin("placegraph.tools.house", "render", "Renderer", "house generator")
-        self._generator = plugin("placegraph.tools.house", "build", "HouseFrames", "house generator")
+        plugin("placegraph.tools.simulator", "render", "Renderer", "house generator")
+        self._generator = plugin("placegraph.tools.simulator", "build", "HouseFrames", "house generator")
 
     @staticmethod
     def matches(path: Path) -> bool:

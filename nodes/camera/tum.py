@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -29,12 +28,10 @@ from placegraph.nodes.camera._folder import (
     read_settings,
     read_text,
 )
+from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.runtime.geometry import pose_from_quaternion
 from placegraph.runtime.messages import Frame
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from placegraph.runtime.vision.geometry import pose_from_quaternion
 
 # fx fy cx cy in px of the three cameras, as the data set's page calibrates them (colour)
 CAMERAS = {

@@ -6,23 +6,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from placegraph.models_onnx.text import TextEncoder
-from placegraph.nodes.fusion.cloud import Ground
-from placegraph.nodes.fusion.given import object_fields
-from placegraph.nodes.fusion.instance import Instance
-from placegraph.nodes.fusion.lift import LiftConfig, lift
-from placegraph.nodes.fusion.objects import AssociationConfig, Moment, ObjectMap
-from placegraph.nodes.fusion.sight import Sight, SightConfig
+from placegraph.models_onnx.text_encoder import TextEncoder
+from placegraph.nodes.fusion.map_message import object_fields
+from placegraph.nodes.fusion.mask_lifting import LiftConfig, lift
+from placegraph.nodes.fusion.object_association import AssociationConfig, Moment, ObjectMap
+from placegraph.nodes.fusion.object_cloud import Ground
+from placegraph.nodes.fusion.object_instance import Instance
 from placegraph.nodes.fusion.submaps import SubmapConfig, Submaps
-from placegraph.nodes.fusion.voxels import FreeSpace, VoxelMap, depth_edges
+from placegraph.nodes.fusion.visibility import Sight, SightConfig
+from placegraph.nodes.fusion.voxel_map import FreeSpace, VoxelMap, depth_edges
+from placegraph.runtime.arrays import F32
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.geometry import backproject, is_rigid, transform
-from placegraph.runtime.join import Join
 from placegraph.runtime.messages import Correction, Keyframe, LastKeyframe, Map, Message, Segments
+from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Context, Node, NodeConfig
+from placegraph.runtime.vision.geometry import backproject, is_rigid, transform
 
 
 class FusionConfig(NodeConfig):
@@ -43,7 +43,7 @@ class FusionConfig(NodeConfig):
     recognised_share: float = Field(default=0.5, ge=0, le=1)
     # of its strongest name, in the mean of the views that recognised it: scores are the detector's, so it is for a
     # dataflow to say from where on they are to be believed
-    least_score: float = Field(default=0.0, ge=0, le=1)
+    min_score: float = Field(default=0.0, ge=0, le=1)
     lift: LiftConfig = LiftConfig()
     association: AssociationConfig = AssociationConfig()
     sight: SightConfig = SightConfig()
@@ -57,16 +57,16 @@ class FusionNode(Node):
     """
 
     config_type = FusionConfig
-    takes: tuple[type[Message], ...] = (Keyframe, Segments, Correction, LastKeyframe)
+    inputs: tuple[type[Message], ...] = (Keyframe, Segments, Correction, LastKeyframe)
     optional = (Correction,)
-    gives = (Map,)
+    outputs = (Map,)
     config: FusionConfig
 
     def __init__(self, config: FusionConfig, context: Context) -> None:
         super().__init__(config, context)
         moves = Correction.__name__ in context.given
-        self.takes = tuple(kind for kind in type(self).takes if moves or kind is not Correction)
-        self._join = Join(*(kind for kind in self.takes if kind is not LastKeyframe))
+        self.inputs = tuple(kind for kind in type(self).inputs if moves or kind is not Correction)
+        self._synchronizer = FrameSynchronizer(*(kind for kind in self.inputs if kind is not LastKeyframe))
         self._submaps = Submaps(config.submap)
         self._voxels = VoxelMap(config.voxel_m, moves)
         self._free = FreeSpace(config.free_cell_m, config.free_height_m, config.free_clearance_m, moves)
@@ -89,7 +89,7 @@ class FusionNode(Node):
         else:
             if isinstance(message, Correction) and len(message.moved_frame_ids):
                 self._moves.append(message)
-            joined = self._join.add(message)
+            joined = self._synchronizer.add(message)
             if joined is None:
                 return maps
             self._fuse(*joined)
@@ -136,7 +136,7 @@ class FusionNode(Node):
         if moves:
             self._objects.move(moves, len(self._submaps) - 1)
 
-    def _add_cloud(self, keyframe: Keyframe, clean_m: NDArray[np.float32], submap: int) -> None:
+    def _add_cloud(self, keyframe: Keyframe, clean_m: F32, submap: int) -> None:
         c, pose = self.config, keyframe.world_from_camera
         thin = clean_m[:: c.stride, :: c.stride]
         xyz = transform(pose, backproject(clean_m, keyframe.intrinsics, c.stride))
@@ -150,7 +150,7 @@ class FusionNode(Node):
     def _is_stable(self, one: Instance) -> bool:
         c = self.config
         seen_enough = one.observations >= max(c.min_observations, c.recognised_share * one.chances)
-        return seen_enough and max(one.votes.values()) >= c.least_score * one.observations
+        return seen_enough and max(one.votes.values()) >= c.min_score * one.observations
 
     def _map(self, final: bool) -> Map:
         c = self.config

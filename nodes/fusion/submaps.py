@@ -7,14 +7,12 @@ first and last are off by.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.geometry import inverse, is_rigid, rotation_angle_rad
 from placegraph.runtime.messages import Correction
-
-F64 = NDArray[np.float64]
+from placegraph.runtime.vision.geometry import inverse, is_rigid, rotation_angle_rad
 
 
 class SubmapConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
@@ -23,8 +21,8 @@ class SubmapConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     keyframes: int = Field(
         default=8, ge=1
     )  # departs: about a metre of walk, over which odometry drifts by a centimetre
-    least_move_m: float = Field(default=0.01, ge=0)  # under a voxel; what is left undone adds up until it is done
-    least_turn_deg: float = Field(default=0.5, ge=0)
+    min_move_m: float = Field(default=0.01, ge=0)  # under a voxel; what is left undone adds up until it is done
+    min_turn_deg: float = Field(default=0.5, ge=0)
 
 
 class Submaps:
@@ -82,8 +80,8 @@ class Submaps:
 
     def _is_felt(self, move: F64) -> bool:
         turned_deg = np.degrees(rotation_angle_rad(move[:3, :3]))
-        far = np.linalg.norm(move[:3, 3]) >= self._config.least_move_m
-        return bool(far or turned_deg >= self._config.least_turn_deg)
+        far = np.linalg.norm(move[:3, 3]) >= self._config.min_move_m
+        return bool(far or turned_deg >= self._config.min_turn_deg)
 
     def _close(self) -> None:
         if self._open:

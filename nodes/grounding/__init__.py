@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
-from placegraph.models_onnx.text import TextEncoder
-from placegraph.nodes.grounding.answer import Reasoner
-from placegraph.nodes.grounding.llm import N_CTX, LanguageModel
-from placegraph.nodes.grounding.names import Names
-from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES, Namer
-from placegraph.nodes.grounding.options import SAFE
-from placegraph.nodes.grounding.reading import default_adapter_path
-from placegraph.nodes.grounding.reply import error_answer, to_json
+from placegraph.models_onnx.text_encoder import TextEncoder
+from placegraph.nodes.grounding.answer_fields import error_answer, to_json
+from placegraph.nodes.grounding.llm_parser import default_adapter_path
+from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, Namer
+from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError
+from placegraph.runtime.language.grammar_options import SAFE
+from placegraph.runtime.language.language_model import N_CTX, LanguageModel
 from placegraph.runtime.messages import Answer, Graph, Message, PlaceNames, Question
 from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.scene_graph import SceneGraph
@@ -42,8 +42,8 @@ class Grounding(Node):
     """Keeps the newest graph, names its places, and answers each question with exactly one Answer."""
 
     config_type = GroundingConfig
-    takes = (Graph, Question)
-    gives = (PlaceNames, Answer)
+    inputs = (Graph, Question)
+    outputs = (PlaceNames, Answer)
     serves = (Question, Answer)
 
     def __init__(self, config: GroundingConfig, context: Context) -> None:

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from placegraph.nodes.grounding.boxes import F64, Boxes
+from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations.extent import bulk, length_m
-from placegraph.nodes.grounding.words import tokens
+from placegraph.runtime.arrays import F64, Bool
+from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.scene_graph import Node
 
 # sRGB of the eleven basic colour terms (Berlin and Kay) and beige, as in CSS but for brown, green and pink,
@@ -55,7 +55,7 @@ class Look:
     sentences: tuple[str, ...]
 
 
-def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: NDArray[np.bool_]) -> Look:
+def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> Look:
     """How well each of n nodes fits the words of an `is`; among (n,): those with whom sizes are compared."""
     said = [word for word in tokens(words.replace("-", " ")) if word not in SAID_BESIDE]
     values, known = np.ones(len(nodes)), []
@@ -131,7 +131,7 @@ def color_fit(node: Node, color: str) -> float:
     return float(_colors([node], color, 0.0, [color])[0][0])
 
 
-def size_fit(boxes: Boxes, size: str, among: NDArray[np.bool_]) -> F64:
+def size_fit(boxes: Boxes, size: str, among: Bool) -> F64:
     """(n,) how well each is called large, small, tall, short, long or narrow among the others: by its rank."""
     if size in ("large", "small"):
         values = bulk(boxes)

@@ -11,22 +11,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from placegraph.nodes.grounding.anchor_matching import Anchors, related, related_without
 from placegraph.nodes.grounding.attributes import look
-from placegraph.nodes.grounding.boxes import Boxes, Layout
+from placegraph.nodes.grounding.box_arrays import Boxes, Layout
 from placegraph.nodes.grounding.groups import group_fits
-from placegraph.nodes.grounding.names import Fit, Names
-from placegraph.nodes.grounding.notation import write
+from placegraph.nodes.grounding.name_matching import Fit, Names
+from placegraph.nodes.grounding.program import ANYTHING, SAME_KIND, Condition, Thing
+from placegraph.nodes.grounding.program_syntax import write
 from placegraph.nodes.grounding.ranking import Ranking
-from placegraph.nodes.grounding.relating import Anchors, related, related_without
 from placegraph.nodes.grounding.relations import Case, order
-from placegraph.nodes.grounding.schema import ANYTHING, SAME_KIND, Condition, Thing
-from placegraph.nodes.grounding.select import Scope, narrow, places_called
-from placegraph.nodes.grounding.view import Views
-from placegraph.nodes.grounding.weighing import Weighing
-from placegraph.nodes.grounding.words import normal_form
+from placegraph.nodes.grounding.scoring import Weighing
+from placegraph.nodes.grounding.search_scope import Scope, narrow, places_called
+from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
-MOST_PAIRS = 600_000  # departs: of targets and anchors judged at once; bounds memory on large maps
+MAX_PAIRS = 600_000  # departs: of targets and anchors judged at once; bounds memory on large maps
 FAIR_TRUST = 0.5  # departs: what is only likely to be called so decides half
 SPARE_TRUST = 0.3  # departs: "the cup on the table near the window" with one table: the cup near the window
 HINT_TRUST = 0.5  # departs: "in the bathroom" of a map without rooms: near the toilet
@@ -180,7 +180,7 @@ class Conditions:
         if thing not in self._known:
             self._known[thing] = self._found(thing, target)
         found = self._known[thing]
-        return found if found is None else found.first(max(MOST_PAIRS // max(targets, 1), 1))
+        return found if found is None else found.first(max(MAX_PAIRS // max(targets, 1), 1))
 
     def _found(self, thing: Thing, target: Thing) -> Anchors | None:
         noun, trust = normal_form(thing.noun), 1.0

@@ -11,20 +11,21 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from placegraph.nodes.grounding.boxes import F64, I64, Boxes
+from placegraph.nodes.grounding.box_arrays import Boxes
+from placegraph.nodes.grounding.program import Condition
 from placegraph.nodes.grounding.relations import apart_m, gaps_m
-from placegraph.nodes.grounding.schema import Condition
+from placegraph.runtime.arrays import F64, I64
 
 ALONE_M = 2.0  # departs: what has nothing like it within this is by itself; at half of it it may be
 GROUP_M = (0.3, 0.8, 1.5)  # departs: gaps that may still hold a group of things together
-MOST_PEERS = 1500  # departs: nobody counts more, and all gaps among them are held at once
+MAX_PEERS = 1500  # departs: nobody counts more, and all gaps among them are held at once
 UNKNOWN = 0.5  # of what is not among those compared
 
 
 def group_fits(boxes: Boxes, rows: I64, condition: Condition) -> tuple[F64, Callable[[int], str]]:
     """(n,) fits of `alone` or `count`, compared among some rows, and a sentence for each."""
     values = np.full(len(boxes), UNKNOWN)
-    if len(rows) > MOST_PEERS:
+    if len(rows) > MAX_PEERS:
         return values, lambda i: ""
     peers = boxes.take(rows)
     gap = apart_m(gaps_m(peers, peers))

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 from placegraph.models_onnx import LocationDetector
 from placegraph.models_onnx.load import load, wrong_task
-from placegraph.nodes.hierarchy.build import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.floors import FloorConfig
-from placegraph.nodes.hierarchy.ground import TravelConfig
+from placegraph.nodes.hierarchy.graph_builder import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
 from placegraph.nodes.hierarchy.rooms import RoomConfig
+from placegraph.nodes.hierarchy.traversability import TravelConfig
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Graph, Map, Message, PlaceNames
 from placegraph.runtime.node import Context, Node, NodeConfig
@@ -31,8 +31,8 @@ class HierarchyNode(Node):
     """Maps to Graphs without names; names of that very revision to the same Graph with names."""
 
     config_type = HierarchyConfig
-    takes = (Map, PlaceNames)
-    gives = (Graph,)
+    inputs = (Map, PlaceNames)
+    outputs = (Graph,)
     feedback = (PlaceNames,)
     config: HierarchyConfig
 

@@ -12,14 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
-Points = NDArray[np.floating]
+from placegraph.runtime.arrays import F64, I64, Points
 
 
 class FloorConfig(BaseModel, frozen=True, strict=True, extra="forbid"):

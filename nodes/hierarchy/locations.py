@@ -15,22 +15,18 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from placegraph.models_onnx import LocationDetector
-from placegraph.nodes.hierarchy.bird_eye import bird_eye
+from placegraph.nodes.hierarchy.birds_eye_view import bird_eye
 from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.rooms import floor_grid
+from placegraph.runtime.arrays import F64, I64, Points
 from placegraph.runtime.errors import ConfigError
-from placegraph.runtime.geometry import convex_footprint
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
-Points = NDArray[np.floating]
+from placegraph.runtime.vision.geometry import convex_footprint
 
 
 class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
@@ -41,8 +37,8 @@ class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     cell_m: float = 0.1  # departs: points are thinned to cells of this size before they are clustered
     eps_m: float = 0.4  # paper, DBSCAN (value not stated): a chair pulled out from its table
     min_cells: int = 4  # paper, DBSCAN (value not stated)
-    least_objects: int = 2  # paper, c (value not stated)
-    least_area_m2: float = 0.25  # paper (value not stated)
+    min_objects: int = 2  # paper, c (value not stated)
+    min_area_m2: float = 0.25  # paper (value not stated)
     compactness: float = 0.25  # paper, C in 4 pi S / P^2 < C (value not stated); a 5:1 strip has .44
     close_m: float = 0.2  # departs: stands for the alpha of the alpha shape
     model: str = ""  # a LocationDetector of the manifest; "": the recipe above
@@ -95,7 +91,7 @@ def _detect(
         if score < config.min_score or not inside:
             continue
         outline = _around(grid.outline(mask), [banded[i] for i in inside], span, config)
-        if cv2.contourArea(outline.astype(np.float32)) >= config.least_area_m2:
+        if cv2.contourArea(outline.astype(np.float32)) >= config.min_area_m2:
             free -= set(inside)
             areas.append(LocationArea(outline, tuple(inside)))
     return sorted(areas, key=lambda area: area.members[0])
@@ -124,7 +120,7 @@ def _recipe(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) 
     return [
         LocationArea(outline, tuple(group))
         for group, outline in zip(members.values(), areas, strict=True)
-        if len(group) >= config.least_objects and outline is not None
+        if len(group) >= config.min_objects and outline is not None
     ]
 
 
@@ -154,6 +150,6 @@ def _outline(objects: list[Points], config: LocationConfig) -> F64 | None:
     outline = grid.outline(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel).astype(bool))
     area = cv2.contourArea(outline.astype(np.float32))
     length = cv2.arcLength(outline.astype(np.float32), True)
-    if area < config.least_area_m2 or 4 * np.pi * area < config.compactness * length**2:
+    if area < config.min_area_m2 or 4 * np.pi * area < config.compactness * length**2:
         return None
     return outline

@@ -12,11 +12,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from placegraph.nodes.hierarchy.ground import Bool, Ground, TravelConfig
-
-I32 = NDArray[np.int32]
+from placegraph.nodes.hierarchy.traversability import Ground, TravelConfig
+from placegraph.runtime.arrays import I32, I64, Bool
 
 NOBODY = -1
 
@@ -82,7 +80,7 @@ def _meetings(owner: I32) -> dict[tuple[int, int], Bool]:
     return found
 
 
-def _standing_sizes(owner: I32, ground: Ground) -> NDArray[np.int64]:
+def _standing_sizes(owner: I32, ground: Ground) -> I64:
     """For each cell where the robot can stand, how many such cells of the same room hang together with it."""
     sizes = np.zeros(owner.shape, np.int64)
     for room in range(int(owner.max(initial=NOBODY)) + 1):

@@ -13,17 +13,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from placegraph.nodes.hierarchy.flood import Neck, flood
 from placegraph.nodes.hierarchy.floors import FloorSpan
-
-Bool = NDArray[np.bool_]
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-I32 = NDArray[np.int32]
-Points = NDArray[np.floating]
+from placegraph.nodes.hierarchy.watershed import Neck, flood
+from placegraph.runtime.arrays import F32, F64, I32, I64, Bool, Points
 
 
 class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
@@ -32,7 +26,7 @@ class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     cell_m: float = 0.05  # HOV-SG
     slice_low_m: float = 1.5  # above the floor, HOV-SG
     slice_high_m: float = 0.1  # below the ceiling; departs: HOV-SG's .3 cuts the lintels that a low camera sees
-    least_slice_m: float = 0.3  # departs: a scan that shows less than this of the slice has walls from lower down
+    min_slice_m: float = 0.3  # departs: a scan that shows less than this of the slice has walls from lower down
     partial_low_m: float = 1.0  # ... namely from here: over tables and the backs of chairs
     level_m: float = 0.1  # a wall counts by the levels of this height that it fills
     wall_fill_m: float = 0.2  # departs: of the slice; HOV-SG's .25 of the fullest cell has no room for a lintel
@@ -53,7 +47,7 @@ class Grid:
     cell_m: float
     shape: tuple[int, int]
 
-    def cells(self, xy: Points) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def cells(self, xy: Points) -> tuple[I64, I64]:
         """Row and column of points (N, 2) or more columns, clipped to the image."""
         cells = np.floor((np.asarray(xy[:, :2], float) - self.origin) / self.cell_m).astype(np.int64)
         return np.clip(cells[:, 1], 0, self.shape[0] - 1), np.clip(cells[:, 0], 0, self.shape[1] - 1)
@@ -113,7 +107,7 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomCon
     """Cells where the slice between furniture and ceiling is filled: walls, and the lintels of open doors."""
     above = points_world[:, 2] - span.low
     low, high = config.slice_low_m, span.high - span.low - config.slice_high_m
-    if high - low < config.least_slice_m:
+    if high - low < config.min_slice_m:
         low, high = config.partial_low_m, max(span.high - span.low, config.partial_low_m + config.level_m)
     tall = (above >= low) & (above <= high)
     rows, columns = grid.cells(points_world[tall])

@@ -8,14 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan
-from placegraph.nodes.hierarchy.ground import TravelConfig
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
-Points = NDArray[np.floating]
+from placegraph.nodes.hierarchy.traversability import TravelConfig
+from placegraph.runtime.arrays import F64, I64, Points
 
 CLIMBING = -1  # of a camera position that stands on no floor
 SLICE_M = 0.5  # walls and rails beside a climbing camera are looked for so far above and below it

@@ -8,20 +8,18 @@ from typing import Any, Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.pose import gravity
-from placegraph.nodes.pose.odometry import Odometry, OdometryConfig
-from placegraph.nodes.pose.rgbd import RgbdConfig, RgbdOdometry
-from placegraph.nodes.pose.visual import View
-from placegraph.runtime.geometry import backproject, is_rigid
+from placegraph.nodes.pose.feature_tracker import View
+from placegraph.nodes.pose.kiss_icp import Odometry, OdometryConfig
+from placegraph.nodes.pose.rgbd_odometry import RgbdConfig, RgbdOdometry
+from placegraph.runtime.arrays import F32, F64
 from placegraph.runtime.messages import End, Frame, Message, Pose
 from placegraph.runtime.node import Context, Node
+from placegraph.runtime.vision.geometry import backproject, is_rigid
 
 logger = logging.getLogger(__name__)
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
 
 
 class PoseConfig(OdometryConfig):
@@ -39,8 +37,8 @@ class PoseNode(Node):
     """Gives one Pose for each Frame, in a world with z up; the first `gravity_frames` wait until up is known."""
 
     config_type = PoseConfig
-    takes = (Frame, End)
-    gives = (Pose,)
+    inputs = (Frame, End)
+    outputs = (Pose,)
 
     def __init__(self, config: PoseConfig, context: Context) -> None:
         super().__init__(config, context)

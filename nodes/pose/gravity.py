@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placegraph.runtime.geometry import rotation_between, transform
+from placegraph.runtime.arrays import F32, F64
+from placegraph.runtime.vision.geometry import rotation_between, transform
 
-F64 = NDArray[np.float64]
-Sample = tuple[F64, F64, NDArray[np.float32]]  # start_from_camera (4, 4), up_camera (3,), points (N, 3) camera frame
+Sample = tuple[F64, F64, F32]  # start_from_camera (4, 4), up_camera (3,), points (N, 3) camera frame
 
 MAX_TILT_RAD = np.deg2rad(50)  # a robot's camera is not rolled or pitched further; planes beyond that are walls
 PLANE_M = 0.03  # a point this near belongs to a plane
 MIN_SHARE = 0.05  # of the points: less is no dominant plane
 TRIALS = 600
-MOST_POINTS = 6000
+MAX_POINTS = 6000
 
 
 @dataclass(frozen=True)
@@ -59,8 +58,8 @@ def level_plane(cloud: F64, near: F64, seed: int) -> tuple[F64, float]:
     random = np.random.default_rng(seed)
     if len(cloud) < 3:
         return near, 0.0
-    if len(cloud) > MOST_POINTS:
-        cloud = cloud[random.choice(len(cloud), MOST_POINTS, replace=False)]
+    if len(cloud) > MAX_POINTS:
+        cloud = cloud[random.choice(len(cloud), MAX_POINTS, replace=False)]
     triples = cloud[random.integers(0, len(cloud), (TRIALS, 3))]
     normals = np.cross(triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0])
     lengths = np.linalg.norm(normals, axis=1)

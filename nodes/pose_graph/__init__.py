@@ -1,7 +1,7 @@
 """Pose graph: keyframes to Corrections; closes loops and moves what odometry has placed wrongly.
 
 Odometry does not need it: its poses matter to the map alone. Only when it is behind by more keyframes than the windows
-of the bus hold (runtime/topics.py) does it hold up what comes before it.
+of the bus hold (runtime/messages/topics.py) does it hold up what comes before it.
 """
 
 from __future__ import annotations
@@ -10,19 +10,18 @@ import logging
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from placegraph.nodes.pose_graph.level import LevelConfig, find_level
-from placegraph.nodes.pose_graph.loops import Loop, LoopConfig, Places
-from placegraph.nodes.pose_graph.optimise import Edge, Level, optimise
-from placegraph.runtime.geometry import inverse, nearest_rigid, rotation_angle_rad
+from placegraph.nodes.pose_graph.level_surfaces import LevelConfig, find_level
+from placegraph.nodes.pose_graph.loop_detector import Loop, LoopConfig, Places
+from placegraph.nodes.pose_graph.optimizer import Edge, Level, optimise
+from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.messages import Correction, Keyframe, Message
 from placegraph.runtime.node import Context, Node, NodeConfig
-from placegraph.runtime.registration import logarithm
+from placegraph.runtime.vision.geometry import inverse, nearest_rigid, rotation_angle_rad
+from placegraph.runtime.vision.registration import logarithm
 
 logger = logging.getLogger(__name__)
-F64 = NDArray[np.float64]
 
 PATIENCE = 40  # moving so many keyframes waits for one more keyframe the next time: a long run's steps stay short
 
@@ -51,8 +50,8 @@ class PoseGraphNode(Node):
     """Gives one Correction for each Keyframe, in order."""
 
     config_type = PoseGraphConfig
-    takes = (Keyframe,)
-    gives = (Correction,)
+    inputs = (Keyframe,)
+    outputs = (Correction,)
     config: PoseGraphConfig
 
     def __init__(self, config: PoseGraphConfig, context: Context) -> None:
@@ -123,7 +122,7 @@ class PoseGraphNode(Node):
         self._poses, self._told = (np.concatenate((poses, pose[None])) for poses in (self._poses, self._told))
         self._walked_m = np.append(self._walked_m, walked_m)
 
-    def _moved(self) -> NDArray[np.int64]:
+    def _moved(self) -> I64:
         """Earlier keyframes that are elsewhere than the map has them."""
         old, new, c = self._told[:-1], self._poses[:-1], self.config
         shift = np.linalg.norm(new[:, :3, 3] - old[:, :3, 3], axis=1)

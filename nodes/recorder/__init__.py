@@ -9,14 +9,17 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from placegraph.nodes.recorder import images, numbers, places, space
+from placegraph.nodes.recorder import draw_health as numbers
+from placegraph.nodes.recorder import draw_images as images
+from placegraph.nodes.recorder import draw_map as space
+from placegraph.nodes.recorder import draw_scene_graph as places
 from placegraph.nodes.recorder.blueprint import opening_view
-from placegraph.nodes.recorder.picture import Picture
+from placegraph.nodes.recorder.drawing import Picture
 from placegraph.runtime import messages as m
 from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.recording import RecordingWriter, images_of
-from placegraph.runtime.topics import TOPICS
 
 RECORDED = tuple(topic.kind for topic in TOPICS.values() if topic.recorded)
 # A kind without an entry is recorded but not drawn.
@@ -47,7 +50,7 @@ class Recorder(Node):
     """Writes what it takes, gives nothing."""
 
     config_type: ClassVar[type[NodeConfig]] = RecorderConfig
-    takes = RECORDED
+    inputs = RECORDED
     optional = (m.Frame, *RECORDED)  # whatever the other nodes of a dataflow give
 
     def __init__(self, config: RecorderConfig, context: Context) -> None:
@@ -58,7 +61,7 @@ class Recorder(Node):
             )
         if not config.file and not config.viewer_port:
             raise ConfigError("[nodes.recorder] file is empty and viewer_port is 0: nothing would be recorded or shown")
-        self.takes = (m.Frame, *RECORDED) if config.frames else RECORDED
+        self.inputs = (m.Frame, *RECORDED) if config.frames else RECORDED
         self._writer: RecordingWriter | None = None
         self._picture: Picture | None = None
 

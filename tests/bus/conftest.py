@@ -3,7 +3,7 @@ from collections.abc import Callable
 
 import pytest
 
-from placegraph.runtime.bus import BusConfig, free_endpoint
+from placegraph.runtime.bus.session import BusConfig, free_endpoint
 
 
 @pytest.fixture

@@ -3,20 +3,20 @@ import threading
 import psutil
 import pytest
 
-from placegraph.runtime.bus import Bus, BusConfig, Request
+from placegraph.runtime.bus.session import Bus, BusConfig, Request
 from placegraph.runtime.errors import ConfigError, QueryError
 
 pytestmark = pytest.mark.bus
 
 
 def test_hub_and_clients_exchange_messages_in_order(bus_config, wait_until) -> None:
-    with Bus(bus_config, hub=True) as hub, Bus(bus_config) as giver, Bus(bus_config) as taker:
+    with Bus(bus_config, hub=True) as hub, Bus(bus_config) as producer, Bus(bus_config) as consumer:
         got: list[tuple[bytes, bytes]] = []
-        taker.subscribe(lambda key, payload, attachment: got.append((payload, attachment)), "topic", "x")
-        taker.declare_alive("taker")
+        consumer.subscribe(lambda key, payload, attachment: got.append((payload, attachment)), "topic", "x")
+        consumer.declare_alive("taker")
         present = threading.Event()
-        giver.watch_alive(lambda name, alive: present.set() if name == "taker" and alive else None)
-        put = giver.publisher("topic", "x")
+        producer.watch_alive(lambda name, alive: present.set() if name == "taker" and alive else None)
+        put = producer.publisher("topic", "x")
         assert present.wait(10)
         for i in range(50):
             put(bytes([i]) * 100_000, i.to_bytes(8))
@@ -47,7 +47,7 @@ def test_unusable_endpoint_is_named(endpoint: str) -> None:
 
 
 def test_nobody_there(bus_config, monkeypatch) -> None:
-    monkeypatch.setattr("placegraph.runtime.bus.CONNECT_TIMEOUT_MS", 300)
+    monkeypatch.setattr("placegraph.runtime.bus.session.CONNECT_TIMEOUT_MS", 300)
     with pytest.raises(ConfigError, match="cannot reach a running placegraph at"):
         Bus(bus_config)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from placegraph.runtime.bus import BusConfig
+from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.config import RunConfig, build
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.inline import Inline

@@ -8,13 +8,13 @@ from pathlib import Path
 import psutil
 import pytest
 
-from placegraph.runtime.bus import BusConfig
-from placegraph.runtime.codec import encode
+from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.config import Dataflow, RunConfig, RunSettings, build
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.inline import Inline
 from placegraph.runtime.launch import Launcher, RestartBudget
 from placegraph.runtime.messages import End, Health, Keyframe, LastKeyframe, Message, Pose, Segments
+from placegraph.runtime.messages.codec import encode
 
 pytestmark = pytest.mark.bus
 
@@ -158,7 +158,7 @@ def test_a_source_that_fails_while_it_ends_is_named(bus_config, tmp_path, wait_u
 def test_children_end_when_their_launcher_is_killed(tmp_path, wait_until) -> None:
     code = (
         "import sys, time\nfrom pathlib import Path\n"
-        "from placegraph.runtime.bus import BusConfig, free_endpoint\n"
+        "from placegraph.runtime.bus.session import BusConfig, free_endpoint\n"
         "from placegraph.runtime.config import RunConfig, build\nfrom placegraph.runtime.launch import Launcher\n"
         "nodes = {'camera': {'source': 'flat'}, 'pose': {}}\n"
         "config = RunConfig(bus=BusConfig(endpoint=free_endpoint()), nodes=nodes)\n"

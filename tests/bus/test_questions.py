@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from placegraph.runtime.bus import Bus, BusConfig, free_endpoint
+from placegraph.runtime.bus.session import Bus, BusConfig, free_endpoint
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.reply import Reply
+from placegraph.runtime.query.reply import Reply
 
 pytestmark = pytest.mark.bus
 

@@ -10,11 +10,11 @@ from placegraph.models_onnx.load import load
 from placegraph.models_onnx.manifest import EMBEDDED_DIR
 from placegraph.tools.evaluate.masks import mask_overlaps
 from placegraph.tools.evaluate.views import EvaluationView, evaluation_views
-from placegraph.tools.house.classes import NAMES
-from placegraph.tools.train.samples import load_shards
-from placegraph.tools.train.views import EVALUATION_SEEDS, render_house
+from placegraph.tools.simulator.classes import NAMES
+from placegraph.tools.training.samples import load_shards
+from placegraph.tools.training.views import EVALUATION_SEEDS, render_house
 
-MOST_BYTES = 4_000_000
+MAX_BYTES = 4_000_000
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def overlap(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def test_each_file_is_small() -> None:
-    assert {path.name for path in EMBEDDED_DIR.glob("*.onnx") if path.stat().st_size > MOST_BYTES} == set()
+    assert {path.name for path in EMBEDDED_DIR.glob("*.onnx") if path.stat().st_size > MAX_BYTES} == set()
 
 
 def test_the_tagger_says_most_of_what_is_there_and_not_much_else(views: list[EvaluationView]) -> None:

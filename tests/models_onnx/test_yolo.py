@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from placegraph.models_onnx.text import DIMENSIONS, TextEncoder
+from placegraph.models_onnx.text_encoder import DIMENSIONS, TextEncoder
 from placegraph.models_onnx.yolo import FAMILY
 from placegraph.runtime.errors import ModelError
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from placegraph.models_onnx.text import TextEncoder
+from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.detector import NODE, DetectorConfig
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Keyframe, Tags

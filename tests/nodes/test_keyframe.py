@@ -57,11 +57,11 @@ def test_no_frames_at_all() -> None:
 def test_live_frames_are_bounded_while_no_pose_comes() -> None:
     gate = node(lossless=False, lost_after_s=1.0)
     assert chosen(gate, [frame(i) for i in range(200)]) == []
-    assert len(gate._join) <= 1 + 1000 / 33
+    assert len(gate._synchronizer) <= 1 + 1000 / 33
     assert chosen(gate, [pose(i, 0.2 * i) for i in range(200)]) == [169, 170, 171, 172]  # then four are in flight
     replay = node(lost_after_s=1.0)
     assert chosen(replay, [frame(i) for i in range(200)]) == []
-    assert len(replay._join) == 200  # bounded by the windows of the bus
+    assert len(replay._synchronizer) == 200  # bounded by the windows of the bus
 
 
 def test_only_untrusted_poses() -> None:

@@ -63,15 +63,15 @@ def test_gives_its_kinds_in_recorded_order(tmp_path: Path) -> None:
     expected = [("Pose", 0), ("Keyframe", 0), ("Pose", 1), ("Pose", 2), ("Keyframe", 2), ("LastKeyframe", 2)]
     assert said(node) == expected
     assert said(node) == expected  # it may be asked again
-    assert node.gives == (m.Pose, m.Keyframe, m.LastKeyframe)
-    assert node.takes == ()
+    assert node.outputs == (m.Pose, m.Keyframe, m.LastKeyframe)
+    assert node.inputs == ()
     assert node.is_lossless()
 
 
 def test_kinds_as_toml_gives_them(tmp_path: Path) -> None:
     path = recorded(tmp_path, pose(0), keyframe(0), pose(1), LAST)
     node = playback(path, kinds=["Pose"])
-    assert node.gives == (m.Pose,)
+    assert node.outputs == (m.Pose,)
     assert said(node) == [("Pose", 0), ("Pose", 1)]
 
 

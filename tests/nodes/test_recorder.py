@@ -10,14 +10,14 @@ import pytest
 from rerun.chunk import RrdReader
 
 from placegraph.nodes.recorder import DRAWN, NODE, RecorderConfig
-from placegraph.nodes.recorder.picture import color_of, markdown
+from placegraph.nodes.recorder.drawing import color_of, markdown
 from placegraph.runtime import messages as m
 from placegraph.runtime.errors import ConfigError, SchemaError
+from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import Context
-from placegraph.runtime.place_graph import Connection, Way
 from placegraph.runtime.recording import kinds_in, properties, read
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
-from placegraph.runtime.topics import TOPICS
+from placegraph.runtime.scene_graph.place_graph import Connection, Way
 
 Play = Callable[..., dict[str, list[dict[str, Any]]]]
 
@@ -176,10 +176,10 @@ def text_of(rows: list[dict[str, Any]]) -> str:
 
 
 def test_takes_what_the_table_marks_and_frames_only_when_told() -> None:
-    assert set(NODE.takes) == {kind for kind, topic in TOPICS.items() if topic.recorded}
-    assert NODE(RecorderConfig(frames=True), Context()).takes == (m.Frame, *NODE.takes)
-    assert NODE.gives == ()
-    assert set(DRAWN) <= {m.Frame, *NODE.takes}
+    assert set(NODE.inputs) == {kind for kind, topic in TOPICS.items() if topic.recorded}
+    assert NODE(RecorderConfig(frames=True), Context()).inputs == (m.Frame, *NODE.inputs)
+    assert NODE.outputs == ()
+    assert set(DRAWN) <= {m.Frame, *NODE.inputs}
 
 
 @pytest.mark.parametrize("file", ["sub/run.rrd", "../run.rrd", "run.mcap", "/run.rrd"])

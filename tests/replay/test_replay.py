@@ -11,7 +11,7 @@ from placegraph.tools.recorded_steps import Reference, differences, summary
 from placegraph.tools.references import LEFT_OUT, RECORDING, SUMMARY
 
 HERE = Path(__file__).parent
-TAKERS = sorted(name for name, kind in node_types().items() if kind.takes)
+CONSUMERS = sorted(name for name, kind in node_types().items() if kind.inputs)
 # One setting of each node that must show in what it gives: proof that the comparison can fail.
 CHANGED: dict[str, dict[str, Any]] = {
     "pose": {"rgbd": {"track": {"window_px": 15}}},
@@ -33,20 +33,20 @@ def reference() -> Reference:
 
 
 def test_every_node_that_takes_something_has_a_reference_or_a_reason(reference: Reference) -> None:
-    assert set(reference.steps) | set(LEFT_OUT) == set(TAKERS)
+    assert set(reference.steps) | set(LEFT_OUT) == set(CONSUMERS)
     assert not set(reference.steps) & set(LEFT_OUT)
-    assert set(TAKERS) <= set(available(NODES))
+    assert set(CONSUMERS) <= set(available(NODES))
     assert all(LEFT_OUT.values())
 
 
-@pytest.mark.parametrize("name", [name for name in TAKERS if name not in LEFT_OUT])
+@pytest.mark.parametrize("name", [name for name in CONSUMERS if name not in LEFT_OUT])
 def test_a_fresh_node_gives_what_it_gave(reference: Reference, name: str) -> None:
     assert any(given for _, given in reference.steps[name])
     found = differences(reference, name)
     assert found == [], "\n".join(["", *found, "meant? placegraph references --update, and say why in the commit"])
 
 
-@pytest.mark.parametrize("name", [name for name in TAKERS if name not in LEFT_OUT])
+@pytest.mark.parametrize("name", [name for name in CONSUMERS if name not in LEFT_OUT])
 def test_a_changed_setting_is_noticed(reference: Reference, name: str) -> None:
     assert differences(reference, name, **CHANGED[name]) != []
 
@@ -54,7 +54,7 @@ def test_a_changed_setting_is_noticed(reference: Reference, name: str) -> None:
 def test_each_kind_that_a_node_gives_is_in_its_reference(reference: Reference) -> None:
     for name, steps in reference.steps.items():
         given = {type(reference.messages[i]) for _, numbers in steps for i in numbers}
-        assert given == set(node_types()[name].gives), name
+        assert given == set(node_types()[name].outputs), name
 
 
 def test_the_language_model_is_asked_in_both_ways(reference: Reference) -> None:

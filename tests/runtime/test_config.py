@@ -77,9 +77,9 @@ def test_order_waits_and_model_folders(tmp_path: Path) -> None:
     flow = build(read(written(tmp_path, text)))
     assert list(flow.nodes) == ["camera", "pose", "keyframe", "instances"]
     assert flow.context.lossless and flow.context.model_dirs == (str(tmp_path / "weights"),)
-    assert flow.giver(Pose) == "pose" and flow.takers(Frame) == ["pose", "keyframe"]
-    assert flow.takers(Segments) == ["keyframe"] and flow.waited_for("instances")["Segments"] == []
-    assert flow.waited_for("keyframe")["Keyframe"] == ["instances"] and flow.takers(Keyframe) == ["instances"]
+    assert flow.producer(Pose) == "pose" and flow.consumers(Frame) == ["pose", "keyframe"]
+    assert flow.consumers(Segments) == ["keyframe"] and flow.awaited_consumers("instances")["Segments"] == []
+    assert flow.awaited_consumers("keyframe")["Keyframe"] == ["instances"] and flow.consumers(Keyframe) == ["instances"]
 
 
 def test_a_data_set_in_real_time_is_live(tmp_path: Path) -> None:

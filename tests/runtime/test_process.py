@@ -2,11 +2,11 @@ from pathlib import Path
 
 import pytest
 
-from placegraph.runtime.bus import BusConfig
-from placegraph.runtime.codec import encode
+from placegraph.runtime.bus.flow_control import Envelope
+from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.flow import Parcel
 from placegraph.runtime.messages import Answer, Graph, LastKeyframe, Message, Question
+from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.process import Process, ProcessSpec
 from placegraph.tools.replay import replay_crash
@@ -15,7 +15,7 @@ from placegraph.tools.replay import replay_crash
 def process(node: str | Node, folder: Path) -> Process:
     name = node if isinstance(node, str) else "grounding"
     context = Context(out_dir=str(folder))
-    spec = ProcessSpec(node=name, settings={}, context=context, bus=BusConfig(), takers={}, question_timeout_s=0.05)
+    spec = ProcessSpec(node=name, settings={}, context=context, bus=BusConfig(), consumers={}, question_timeout_s=0.05)
     shell = Process(spec, build_node(name, {}, context) if isinstance(node, str) else node)
     shell._receipt = lambda payload, attachment: None
     return shell
@@ -26,9 +26,9 @@ def last_keyframe() -> LastKeyframe:
 
 
 def fail(shell: Process) -> None:
-    shell._puts = dict.fromkeys(shell.node.gives, lambda payload, attachment: None)
+    shell._puts = dict.fromkeys(shell.node.outputs, lambda payload, attachment: None)
     for number in (1, 2):  # the second one is one too many
-        shell._take(Parcel(LastKeyframe, number, encode(last_keyframe())))
+        shell._take(Envelope(LastKeyframe, number, encode(last_keyframe())))
 
 
 def test_a_step_that_fails_leaves_a_crash_file_that_fails_again(tmp_path: Path, capsys) -> None:
@@ -49,7 +49,7 @@ def test_a_crash_file_that_cannot_be_written_does_not_hide_the_error(tmp_path: P
 class SlowAnswers(Node):
     """Answers nothing in time."""
 
-    takes, gives, serves = (Graph, Question), (Answer,), (Question, Answer)
+    inputs, outputs, serves = (Graph, Question), (Answer,), (Question, Answer)
     stepped: int = 0
 
     def step(self, message: Message) -> list[Message]:
@@ -72,12 +72,12 @@ def test_a_question_that_nobody_waits_for_any_more_is_not_stepped(tmp_path: Path
     node, asker = SlowAnswers(None, Context()), Asker()
     shell = process(node, tmp_path)
     shell._puts = {Question: lambda payload, attachment: None}
-    shell._desk.take(asker)  # type: ignore[arg-type]
-    parcel = shell.inbox.get(1.0)
-    assert parcel is not None
+    shell._query_server.take(asker)  # type: ignore[arg-type]
+    envelope = shell.inbox.get(1.0)
+    assert envelope is not None
     if not in_time:
-        shell._desk._waiting[parcel.sequence].timer.join()
+        shell._query_server._waiting[envelope.sequence].timer.join()
         assert asker.replied
-    shell._take(parcel)
+    shell._take(envelope)
     assert node.stepped == int(in_time)
     shell.end()

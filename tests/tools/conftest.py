@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.camera.flat import Flat
-from placegraph.runtime.bus import free_endpoint
+from placegraph.runtime.bus.session import free_endpoint
 from placegraph.tools.cli import main
 
 # Given poses and no language model: fast, and enough for what the tools do.

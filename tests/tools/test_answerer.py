@@ -3,8 +3,8 @@ import json
 import pytest
 
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.question import make_question
-from placegraph.runtime.reply import Reply
+from placegraph.runtime.query.reply import Reply
+from placegraph.runtime.query.request import make_question
 from placegraph.tools.answerer import KEPT, Answerer, in_own_ids
 
 FAST = {"use_model": False, "name_places": False}

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from placegraph.runtime.reply import Reply
+from placegraph.runtime.query.reply import Reply
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.answerer import Answerer
 

@@ -6,8 +6,8 @@ import sys
 import psutil
 import pytest
 
-from placegraph.nodes.grounding import llm
 from placegraph.runtime.errors import ModelError
+from placegraph.runtime.language import language_model as llm
 
 pytestmark = pytest.mark.bus  # one of the things looked at is whether a hub and a client meet
 

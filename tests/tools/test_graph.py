@@ -3,8 +3,8 @@ import re
 
 import pytest
 
+from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.runtime.topics import TOPICS
 from placegraph.tools.graph import node_types
 
 
@@ -19,11 +19,11 @@ def test_the_tables_name_every_node_and_message(cli) -> None:
 
 def test_givers_come_before_takers() -> None:
     types = node_types()
-    seen = {kind for node in types.values() if not node.takes for kind in node.gives}
+    seen = {kind for node in types.values() if not node.inputs for kind in node.outputs}
     for node in types.values():
-        needed = {k for k in node.takes if k not in node.feedback} & {k for t in types.values() for k in t.gives}
-        assert needed <= seen | set(node.gives)
-        seen |= set(node.gives)
+        needed = {k for k in node.inputs if k not in node.feedback} & {k for t in types.values() for k in t.outputs}
+        assert needed <= seen | set(node.outputs)
+        seen |= set(node.outputs)
 
 
 def test_the_tree_of_a_map_shows_every_node_below_its_parent(cli, mapped) -> None:

@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 
-from placegraph.runtime.place_graph import Approach, Connection, Way
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph.place_graph import Approach, Connection, Way
 
 
 def node(node_id: str, parent: str, name: str = "", **more: object) -> Node:

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from placegraph.runtime.question import make_question
+from placegraph.runtime.query.request import make_question
 from placegraph.tools.answerer import Answerer
 
 ROOM = (  # name, centre, size in metres

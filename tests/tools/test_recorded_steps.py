@@ -8,8 +8,8 @@ import msgpack
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.llm import LanguageModel, Reply
 from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.language.language_model import LanguageModel, Reply
 from placegraph.runtime.messages import Answer, Frame, Graph, Keyframe, Pose
 from placegraph.tools.recorded_steps import (
     Reference,

@@ -5,10 +5,10 @@ import msgpack
 import pytest
 
 from placegraph.runtime import messages as m
-from placegraph.runtime.bus import BusConfig
-from placegraph.runtime.codec import encode
+from placegraph.runtime.bus.flow_control import Envelope
+from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.flow import Parcel
+from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context, build_node
 from placegraph.runtime.process import Process, ProcessSpec
 from placegraph.runtime.recording import RecordingWriter, read
@@ -100,11 +100,11 @@ def crash(tmp_path):
     """The crash file that the shell wrote when a broken graph reached the grounding node."""
     spec = ProcessSpec(
         node="grounding", settings=QUIET_NODE, context=Context(out_dir=str(tmp_path)), question_timeout_s=1.0,
-        bus=BusConfig(endpoint="tcp/127.0.0.1:1", prefix="test"), takers={},
+        bus=BusConfig(endpoint="tcp/127.0.0.1:1", prefix="test"), consumers={},
     )  # fmt: skip
     process = Process(spec, build_node("grounding", QUIET_NODE, spec.context))
     graph = m.Graph(frame_id=7, stamp_ns=0, revision=2, final=False, named=False, json="{")
-    process.inbox.put(Parcel(m.Graph, 1, encode(graph)))
+    process.inbox.put(Envelope(m.Graph, 1, encode(graph)))
     process.stop()
     with pytest.raises(SchemaError):
         process.run()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.camera.flat import Flat
-from placegraph.runtime.bus import Bus, BusConfig, free_endpoint
+from placegraph.runtime.bus.session import Bus, BusConfig, free_endpoint
 from placegraph.runtime.scene_graph import SceneGraph
 
 

@@ -20,10 +20,10 @@ import numpy as np
 import typer
 
 from placegraph.nodes.camera.flat import Flat
-from placegraph.runtime.bus import Bus, BusConfig, free_endpoint
-from placegraph.runtime.codec import decode, encode
+from placegraph.runtime.bus.session import Bus, BusConfig, free_endpoint
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.messages import Keyframe
+from placegraph.runtime.messages.codec import decode, encode
 from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.recording import RecordingWriter
 from placegraph.tools.bench.contract import fuzz
@@ -102,14 +102,14 @@ def bus_cost(keyframe: Keyframe) -> Cost:
             raise PlacegraphError(f"the bus did not deliver within {ARRIVAL_TIMEOUT_S:g} s over loopback") from None
 
     config = BusConfig.model_validate({"endpoint": free_endpoint()})
-    with Bus(config, hub=True), Bus(config) as giver, Bus(config) as taker:
-        taker.subscribe(lambda key, data, attachment: arrived.put(data), "bench")
-        taker.declare_alive("taker")
+    with Bus(config, hub=True), Bus(config) as producer, Bus(config) as consumer:
+        consumer.subscribe(lambda key, data, attachment: arrived.put(data), "bench")
+        consumer.declare_alive("taker")
         ready = threading.Event()
-        giver.watch_alive(lambda name, present: ready.set())
+        producer.watch_alive(lambda name, present: ready.set())
         if not ready.wait(ARRIVAL_TIMEOUT_S):
             raise PlacegraphError(f"nobody appeared on the bus within {ARRIVAL_TIMEOUT_S:g} s over loopback")
-        put = giver.publisher("bench")
+        put = producer.publisher("bench")
 
         def over_bus() -> None:
             put(payload, b"")
@@ -156,14 +156,14 @@ def fusion_costs() -> list[Cost]:
     perceive.start()
     try:
         # twice at first: what is new costs more than what is known, whatever the size of the map
-        times_ms, gives = _fuse([*start, *start, *walk[len(start) :], *start], perceive, fusion)
+        times_ms, outputs = _fuse([*start, *start, *walk[len(start) :], *start], perceive, fusion)
     finally:
         perceive.stop()
     early, late = slice(len(start), 2 * len(start)), slice(-len(start), None)
     costs = []
     for part, given in (("fusion: add a keyframe", False), ("fusion: add and give the map", True)):
         medians = [
-            statistics.median(ms for ms, gave in zip(times_ms[when], gives[when], strict=True) if gave is given)
+            statistics.median(ms for ms, gave in zip(times_ms[when], outputs[when], strict=True) if gave is given)
             for when in (late, early)
         ]
         costs.append(Cost(f"{part}, whole walk", medians[0], "same views, first quarter", medians[1]))
@@ -172,15 +172,15 @@ def fusion_costs() -> list[Cost]:
 
 def _fuse(views: list[Keyframe], perceive: Node, fusion: Node) -> tuple[list[float], list[bool]]:
     """Time of each view's step in ms, and whether it gave the Map."""
-    times_ms, gives = [], []
+    times_ms, outputs = [], []
     for frame_id, view in enumerate(views):
         keyframe = dataclasses.replace(view, frame_id=frame_id)
         _, segments = perceive.step(keyframe)
         fusion.step(keyframe)
         took_ms, maps = _timed_ms(partial(fusion.step, segments))
         times_ms.append(took_ms)
-        gives.append(bool(maps))
-    return times_ms, gives
+        outputs.append(bool(maps))
+    return times_ms, outputs
 
 
 def recorder_cost(keyframe: Keyframe) -> Cost:

@@ -13,19 +13,19 @@ import numpy as np
 import psutil
 from pydantic import ValidationError
 
-from placegraph.runtime.codec import decode, encode
-from placegraph.runtime.desk import Desk
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.messages import Answer, Graph, Question
+from placegraph.runtime.messages.codec import decode, encode
 from placegraph.runtime.node import Context, Node, build_node
-from placegraph.runtime.object_list import read_listed
-from placegraph.runtime.reply import Reply
-from placegraph.runtime.scene import scene_of
+from placegraph.runtime.query.query_server import QueryServer
+from placegraph.runtime.query.reply import Reply
 from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.runtime.scene_graph.object_list import read_listed
+from placegraph.runtime.scene_graph.object_list_import import scene_of
 from placegraph.tools.bench.fuzz import requests
-from placegraph.tools.house.build import build
-from placegraph.tools.house.listing import object_list
-from placegraph.tools.house.questions import questions
+from placegraph.tools.simulator.build import build
+from placegraph.tools.simulator.listing import object_list
+from placegraph.tools.simulator.questions import questions
 
 NODE_ID = re.compile(r"\b[BFRLOC][0-9]+\b")
 TIMEOUT_S = 600.0  # nobody waits: what takes long is seen in the times
@@ -115,7 +115,7 @@ def _put(node: Node, asker: _Asker, mode: str) -> None:
             raise PlacegraphError(f"{len(answers)} answers from the node")
         desk.answer(number, decode(Answer, encode(answers[0])).json)
 
-    desk = Desk(forward, TIMEOUT_S)
+    desk = QueryServer(forward, TIMEOUT_S)
     try:
         desk.take(asker)  # type: ignore[arg-type]  # of the bus's Request it needs what the asker has
     finally:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.runtime.question import FIELDS, MAX_BYTES, MAX_TEXT
+from placegraph.runtime.query.request import FIELDS, MAX_BYTES, MAX_TEXT
 
 FOREIGN = (
     "où est la chaise à côté de la table", "wo ist der rote Stuhl neben dem Bett?", "найди лампу на столе",

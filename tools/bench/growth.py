@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.messages import Keyframe, LastKeyframe, Map, Message, Segments
 from placegraph.runtime.node import Context, Node, build_node
-
-F64 = NDArray[np.float64]
 
 WIDTH, HEIGHT = 160, 120
 INTRINSICS = np.array([120.0, 120.0, 80.0, 60.0])  # 67 degrees across, as an OAK-D
@@ -114,7 +112,7 @@ def _view(frame_id: int, boxes: list[Box], pose: F64) -> tuple[Keyframe, Segment
     return keyframe, segments
 
 
-def _trace(boxes: list[Box], pose: F64) -> tuple[F64, NDArray[np.int64]]:
+def _trace(boxes: list[Box], pose: F64) -> tuple[F64, I64]:
     """Depth (H, W) in metres along the optical axis, 0 where nothing is hit, and the box hit, -1 for none."""
     v, u = np.mgrid[:HEIGHT, :WIDTH]
     fx, fy, cx, cy = INTRINSICS

@@ -12,30 +12,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placegraph.models_onnx.text import TextEncoder
+from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.camera import detect
-from placegraph.nodes.grounding.answer import Reasoner
-from placegraph.nodes.grounding.llm import LanguageModel
-from placegraph.nodes.grounding.names import Names
-from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES
-from placegraph.nodes.grounding.notation import read
-from placegraph.nodes.grounding.reading import default_adapter_path, read_by_examples, read_request
-from placegraph.nodes.grounding.schema import Program, Thing
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_by_examples, read_request
+from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
+from placegraph.nodes.grounding.program import Program, Thing
+from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.reasoner import Reasoner
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, QueryError, SourceError
+from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.messages import Question
-from placegraph.runtime.question import make_question
+from placegraph.runtime.query.request import make_question
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.evaluate.aligned_map import read_aligned
 from placegraph.tools.evaluate.grounding import Reply, eye_in_map, read_questions
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
-from placegraph.tools.house.build import build
-from placegraph.tools.house.questions import AskedQuestion, questions
-from placegraph.tools.house.true_graph import true_graph
 from placegraph.tools.map_folder import TRAJECTORY, find_graph, read_trajectory
-
-F64 = NDArray[np.float64]
+from placegraph.tools.simulator.build import build
+from placegraph.tools.simulator.questions import AskedQuestion, questions
+from placegraph.tools.simulator.true_graph import true_graph
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F64, Points
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.geometry import bounding_box, transform
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.vision.geometry import bounding_box, transform
 from placegraph.tools.map_folder import OBJECTS, find_graph, read_object_clouds
-
-F64 = NDArray[np.float64]
-Points = NDArray[np.floating]
 
 
 @dataclass(frozen=True, eq=False)

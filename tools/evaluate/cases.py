@@ -7,21 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placegraph.nodes.camera import detect
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.evaluate.aligned_map import read_aligned
+from placegraph.tools.evaluate.ground_truth import Known
 from placegraph.tools.evaluate.house import house_scores, known_of
-from placegraph.tools.evaluate.known import Known
 from placegraph.tools.evaluate.progress import progress_scores
 from placegraph.tools.evaluate.scores import map_scores
 from placegraph.tools.evaluate.trajectory import at_times, level_alignment, paired, read_poses, trajectory_scores
 from placegraph.tools.evaluate.truth_file import read_truth_file, write_truth_file
-from placegraph.tools.house.truth import TRUTH, read_truth
 from placegraph.tools.map_folder import TRAJECTORY
-
-F64 = NDArray[np.float64]
+from placegraph.tools.simulator.truth import TRUTH, read_truth
 
 
 def source_scores(folder: Path, source: Path, questions: bool = False) -> dict[str, Any]:

@@ -6,20 +6,18 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 
-from placegraph.runtime.geometry import transform
-from placegraph.runtime.place_graph import Connection
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.runtime.scene_graph.place_graph import Connection
+from placegraph.runtime.vision.geometry import transform
 from placegraph.tools.evaluate.places import share
-from placegraph.tools.house.truth import TrueConnection, Truth
-
-F64 = NDArray[np.float64]
+from placegraph.tools.simulator.truth import TrueConnection, Truth
 
 NEAR_M = {"doors": 0.5, "stairs": 1.0}  # a found one is right when its middle, or the worse of its ends, is so near
-LEAST_TRAVEL_M = 1.0  # ratios of shorter ways say more about where the door's middle was put
+MIN_TRAVEL_M = 1.0  # ratios of shorter ways say more about where the door's middle was put
 FAR = 1e6
 
 
@@ -76,13 +74,13 @@ def _travel(graph: SceneGraph, right: Mapping[str, TrueConnection]) -> dict[str,
         if one in right and other in right:
             a, b = sorted((right[one], right[other]), key=lambda true: true.id)
             true_length = dict(a.travel_m).get(b.id, 0.0)
-            if true_length >= LEAST_TRAVEL_M:
+            if true_length >= MIN_TRAVEL_M:
                 ratios.append(length / true_length)
     return {
         "pairs": len(ratios),
         "mean_ratio": _mean(ratios),
-        "least_ratio": min(ratios, default=float("nan")),
-        "largest_ratio": max(ratios, default=float("nan")),
+        "min_ratio": min(ratios, default=float("nan")),
+        "max_ratio": max(ratios, default=float("nan")),
     }
 
 

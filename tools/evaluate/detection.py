@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from placegraph.runtime.arrays import F64, I64, Bool
 
-MOST_BOXES = 100  # of one image count, best first; COCO's maxDets
+MAX_BOXES = 100  # of one image count, best first; COCO's maxDets
 RECALLS = np.linspace(0, 1, 101)  # at which the precision is read; COCO
 
 
@@ -31,19 +28,19 @@ class TrueBoxes:
 
     boxes: F64
     classes: I64
-    ignored: Bools
+    ignored: Bool
 
 
 def average_precisions(
-    found: Sequence[FoundBoxes], true: Sequence[TrueBoxes], classes: int, least_iou: float = 0.5
+    found: Sequence[FoundBoxes], true: Sequence[TrueBoxes], classes: int, min_iou: float = 0.5
 ) -> F64:
     """AP (classes,) over images in order; NaN where a class has no truth that counts.
 
-    Best score first, a box takes the free true box of its class that it overlaps most, by `least_iou` at least; one
+    Best score first, a box takes the free true box of its class that it overlaps most, by `min_iou` at least; one
     that overlaps only an ignored true box so much is neither right nor wrong.
     """
     limited = [_best(one) for one in found]
-    return np.array([_of_class(limited, true, k, least_iou) for k in range(classes)])
+    return np.array([_of_class(limited, true, k, min_iou) for k in range(classes)])
 
 
 def mean_of_known(values: F64) -> float:
@@ -53,11 +50,11 @@ def mean_of_known(values: F64) -> float:
 
 
 def _best(found: FoundBoxes) -> FoundBoxes:
-    order = np.argsort(-found.scores, kind="stable")[:MOST_BOXES]
+    order = np.argsort(-found.scores, kind="stable")[:MAX_BOXES]
     return FoundBoxes(found.boxes[order], found.classes[order], found.scores[order])
 
 
-def _of_class(found: Sequence[FoundBoxes], true: Sequence[TrueBoxes], k: int, least_iou: float) -> float:
+def _of_class(found: Sequence[FoundBoxes], true: Sequence[TrueBoxes], k: int, min_iou: float) -> float:
     scores, right, count = [np.zeros(0)], [np.zeros(0, bool)], 0
     for one, truth in zip(found, true, strict=True):
         mine, theirs = one.classes == k, truth.classes == k
@@ -65,8 +62,8 @@ def _of_class(found: Sequence[FoundBoxes], true: Sequence[TrueBoxes], k: int, le
         count += int(counts.sum())
         if not mine.any():
             continue
-        hit = _matched(one.boxes[mine], truth.boxes[counts], least_iou)
-        aside = overlaps(one.boxes[mine], truth.boxes[theirs & truth.ignored]).max(axis=1, initial=0) >= least_iou
+        hit = _matched(one.boxes[mine], truth.boxes[counts], min_iou)
+        aside = overlaps(one.boxes[mine], truth.boxes[theirs & truth.ignored]).max(axis=1, initial=0) >= min_iou
         judged = hit | ~aside
         scores.append(one.scores[mine][judged])
         right.append(hit[judged])
@@ -75,20 +72,20 @@ def _of_class(found: Sequence[FoundBoxes], true: Sequence[TrueBoxes], k: int, le
     return _interpolated(np.concatenate(scores), np.concatenate(right), count)
 
 
-def _matched(boxes: F64, true: F64, least_iou: float) -> Bools:
+def _matched(boxes: F64, true: F64, min_iou: float) -> Bool:
     """Which boxes (N, 4), best first, find a true box (M, 4) of their own."""
     hit = np.zeros(len(boxes), bool)
     if len(true):
         iou = overlaps(boxes, true)
         for i in range(len(boxes)):
             j = int(iou[i].argmax())
-            if iou[i, j] >= least_iou:
+            if iou[i, j] >= min_iou:
                 hit[i] = True
                 iou[:, j] = -1
     return hit
 
 
-def _interpolated(scores: F64, right: Bools, count: int) -> float:
+def _interpolated(scores: F64, right: Bool, count: int) -> float:
     """Mean over RECALLS of the best precision at that recall or beyond it, 0 where it is never reached."""
     hits = np.cumsum(right[np.argsort(-scores, kind="stable")])
     precision = hits / np.arange(1, len(hits) + 1)

@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
-from placegraph.runtime.geometry import box_iou
-from placegraph.runtime.question import make_question
+from placegraph.runtime.query.request import make_question
+from placegraph.runtime.vision.geometry import box_iou
 from placegraph.tools.answerer import Answerer
 from placegraph.tools.evaluate.places import share
-from placegraph.tools.house.questions import AskedQuestion, from_json
-from placegraph.tools.house.truth import QUESTIONS, TRUTH
-
-F64 = NDArray[np.float64]
+from placegraph.tools.simulator.questions import AskedQuestion, from_json
+from placegraph.tools.simulator.truth import QUESTIONS, TRUTH
 
 IOUS = (0.1, 0.25, 0.5, 0.75)  # paper, "Metrics" of object grounding
 

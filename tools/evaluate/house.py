@@ -6,28 +6,24 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.aligned_map import read_aligned
 from placegraph.tools.evaluate.connections import connection_scores
+from placegraph.tools.evaluate.ground_truth import Known, KnownFloor, KnownObject, KnownPlace, Sight, Words
 from placegraph.tools.evaluate.grounding import ask_all, grounding_scores, read_questions
-from placegraph.tools.evaluate.known import Known, KnownFloor, KnownObject, KnownPlace, Sight, Words
 from placegraph.tools.evaluate.place_names import place_name_scores
 from placegraph.tools.evaluate.scores import map_scores
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
-from placegraph.tools.house.classes import CLASSES
-from placegraph.tools.house.space import inside
-from placegraph.tools.house.truth import Seen, TrueLocation, TrueRoom, Truth, read_truth
 from placegraph.tools.map_folder import TRAJECTORY, find_graph, read_trajectory
+from placegraph.tools.simulator.classes import CLASSES
+from placegraph.tools.simulator.space import inside
+from placegraph.tools.simulator.truth import Seen, TrueLocation, TrueRoom, Truth, read_truth
 
-F64 = NDArray[np.float64]
-
-LEAST_FRAMES = 5  # seen well: clear in so many frames
-LEAST_SHARE = 0.5  # of a location's members must have been seen well
-LEAST_HEIGHT_M = 1.0  # of a camera over the floor it is on: on the stairs it rises above a storey before the feet do
+MIN_FRAMES = 5  # seen well: clear in so many frames
+MIN_SHARE = 0.5  # of a location's members must have been seen well
+MIN_HEIGHT_M = 1.0  # of a camera over the floor it is on: on the stairs it rises above a storey before the feet do
 HOUSE_WORDS = Words({one.name: (*one.said[1:], *one.unsaid) for one in CLASSES})
 
 
@@ -61,7 +57,7 @@ def known_of(truth: Truth, seen: Sequence[Seen], positions: F64, trajectory: Map
     """A house as scoring reads it, after a walk that was at positions (N, 3) and saw the objects as `seen`, by id.
 
     A floor was seen when the walk was on it; a room when the walk entered it or saw an object of it well; a location
-    when it saw LEAST_SHARE of the members well.
+    when it saw MIN_SHARE of the members well.
     """
     sights = [sight_of(one) for one in seen]
     looked_into = {one.room for one, sight in zip(truth.objects, sights, strict=True) if sight == "well"}
@@ -88,7 +84,7 @@ def known_of(truth: Truth, seen: Sequence[Seen], positions: F64, trajectory: Map
 
 def sight_of(seen: Seen) -> Sight:
     """Whether the walk showed an object well enough to ask for it."""
-    if seen.clear_frames >= LEAST_FRAMES:
+    if seen.clear_frames >= MIN_FRAMES:
         return "well"
     return "poorly" if seen.frames else "never"
 
@@ -100,10 +96,10 @@ def _entered_room(room: TrueRoom, truth: Truth, positions: F64) -> bool:
 def _entered(outline: F64, floor_index: int, truth: Truth, positions: F64) -> bool:
     floor = truth.floors[floor_index]
     height = positions[:, 2] - floor.z_m
-    here = positions[(height > LEAST_HEIGHT_M) & (height < floor.height_m)]
+    here = positions[(height > MIN_HEIGHT_M) & (height < floor.height_m)]
     return bool(inside(outline, here[:, :2]).any())
 
 
 def _location_seen(place: TrueLocation, sights: Sequence[Sight]) -> bool:
     well = sum(sights[member] == "well" for member in place.members)
-    return well > 0 and well >= LEAST_SHARE * len(place.members)
+    return well > 0 and well >= MIN_SHARE * len(place.members)

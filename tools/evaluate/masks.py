@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from placegraph.runtime.arrays import F64, Bool
 
 
-def mask_overlaps(found: Sequence[Bools], true: Sequence[Bools]) -> F64:
+def mask_overlaps(found: Sequence[Bool], true: Sequence[Bool]) -> F64:
     """(N,) intersection over union of each found mask (H, W) with the true one of its place; NaN where both are empty.
 
     Their mean is the mean IoU.

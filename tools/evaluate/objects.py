@@ -17,17 +17,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.scene_graph import Tag
 from placegraph.tools.evaluate.aligned_map import MapObject
-from placegraph.tools.evaluate.known import KnownObject, Words
+from placegraph.tools.evaluate.ground_truth import KnownObject, Words
 from placegraph.tools.evaluate.places import share
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
-LEAST_IOU = 0.25
+MIN_IOU = 0.25
 STRICT_IOU = 0.5
 THIN_M = 0.12
 NEAR_M = 0.25
@@ -43,7 +40,7 @@ class Pairing:
     iou: F64
     apart_m: F64
     inside: F64
-    named: Bools
+    named: Bool
 
 
 def object_scores(found: Sequence[MapObject], true: Sequence[KnownObject], words: Words) -> dict[str, Any]:
@@ -54,7 +51,7 @@ def object_scores(found: Sequence[MapObject], true: Sequence[KnownObject], words
     fit = fits(pairing, np.array([one.box for one in true]).reshape(-1, 2, 3))
     right = pair(pairing, fit & well)
     strict = pair(pairing, pairing.named & (pairing.iou >= STRICT_IOU) & well)
-    anyhow = pair(pairing, (pairing.iou >= LEAST_IOU) & well)
+    anyhow = pair(pairing, (pairing.iou >= MIN_IOU) & well)
     on = fit | (pairing.named & (pairing.inside >= INSIDE))
     aside = {i for i in range(len(found)) if i not in right and on[i, poor].any()}
     got, truth = sorted(right.values()), int(well.sum())
@@ -71,13 +68,13 @@ def object_scores(found: Sequence[MapObject], true: Sequence[KnownObject], words
         "recall_any_name": share(len(anyhow), truth),
         "mean_iou": share(float(sum(pairing.iou[i, j] for i, j in right.items())), len(right)),
         "map_per_found": _each(on, got),
-        "map_per_found_any_name": _each(pairing.iou >= LEAST_IOU, sorted(anyhow.values())),
+        "map_per_found_any_name": _each(pairing.iou >= MIN_IOU, sorted(anyhow.values())),
         "top_k": top_k(tags, words),
         "classes": _by_class(found, true, called, right, aside),
     }
 
 
-def _each(on: Bools, got: Sequence[int]) -> float:
+def _each(on: Bool, got: Sequence[int]) -> float:
     """Map objects on true ones that were found, for each of those: 1 where none is there twice."""
     return share(int(on[:, list(got)].any(axis=1).sum()) if got else 0, len(got))
 
@@ -99,13 +96,13 @@ def compare(found: Sequence[MapObject], true: Sequence[KnownObject], called: Seq
     )
 
 
-def fits(pairing: Pairing, true_boxes: F64) -> Bools:
+def fits(pairing: Pairing, true_boxes: F64) -> Bool:
     """(map, true) which map objects fit which true boxes (T, 2, 3)."""
     thin = (true_boxes[:, 1] - true_boxes[:, 0]).min(axis=1) < THIN_M
-    return np.asarray(pairing.named & ((pairing.iou >= LEAST_IOU) | (thin[None] & (pairing.apart_m < NEAR_M))))
+    return np.asarray(pairing.named & ((pairing.iou >= MIN_IOU) | (thin[None] & (pairing.apart_m < NEAR_M))))
 
 
-def pair(pairing: Pairing, allowed: Bools) -> dict[int, int]:
+def pair(pairing: Pairing, allowed: Bool) -> dict[int, int]:
     """Map object to true object, one to one among the allowed (map, true): largest IoU first, then nearest centres."""
     rows, columns = np.nonzero(allowed)
     order = np.lexsort((pairing.apart_m[rows, columns], -pairing.iou[rows, columns]))

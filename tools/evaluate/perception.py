@@ -10,26 +10,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placegraph.models_onnx import Boxes, Detector, ScoredNames, Segmenter, Tagger
 from placegraph.models_onnx.load import load
 from placegraph.models_onnx.manifest import find
-from placegraph.nodes.grounding.words import normal_form
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.node import plugin
 from placegraph.tools.evaluate import detection, tags
 from placegraph.tools.evaluate.detection import FoundBoxes, TrueBoxes, mean_of_known
 from placegraph.tools.evaluate.house import HOUSE_WORDS
 from placegraph.tools.evaluate.masks import mask_overlaps
 from placegraph.tools.evaluate.views import evaluation_views
-from placegraph.tools.house.classes import CLASSES, NAMES
-from placegraph.tools.train.samples import Shard
-
-F64 = NDArray[np.float64]
+from placegraph.tools.simulator.classes import CLASSES, NAMES
+from placegraph.tools.training.samples import Shard
 
 FAMILIES = "placegraph.models_onnx"
-LEAST_SCORE = 0.01  # in place of a run's own floor: average precision is about the order of all finds
+MIN_SCORE = 0.01  # in place of a run's own floor: average precision is about the order of all finds
 UNSAID = tuple(one.unsaid[0] if one.unsaid else one.name for one in CLASSES)  # a class without a synonym by its name
 HAS_UNSAID = np.array([bool(one.unsaid) for one in CLASSES])
 CLASS_OF_WORD = {word: NAMES.index(name) for word, name in HOUSE_WORDS.class_of_word.items()}
@@ -80,7 +78,7 @@ class Networks:
 def _unfloored(name: str, model_dirs: Sequence[Path]) -> object:
     weights = find(name, model_dirs)
     options = import_module(f"{FAMILIES}.{weights.family}").Options
-    floor = {"min_score": LEAST_SCORE} if "min_score" in options.model_fields else {}
+    floor = {"min_score": MIN_SCORE} if "min_score" in options.model_fields else {}
     with tempfile.TemporaryDirectory() as folder:
         files = dict(weights.files)
         if "thresholds" in files:  # RAM's floors are a file, one for each tag

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.nodes.grounding.words import normal_form, synonyms
+from placegraph.runtime.language.word_forms import normal_form, synonyms
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.aligned_map import AlignedMap, MapPlace
 from placegraph.tools.evaluate.places import Area, Overlaps, match_floors, overlaps, share
-from placegraph.tools.house.truth import Truth
+from placegraph.tools.simulator.truth import Truth
 
-LEAST_INSIDE = 0.5  # of a map place that must lie in one true place; else it is of no one kind, and not judged
-MOST_NAMES = 3
+MIN_INSIDE = 0.5  # of a map place that must lie in one true place; else it is of no one kind, and not judged
+MAX_NAMES = 3
 UNKNOWN_FLOOR = -1
 
 
@@ -44,12 +44,12 @@ def name_scores(names: Sequence[Sequence[str]], met: Overlaps, kinds: Sequence[s
     """Scores of F map places with these names, best first, that overlap T true ones of these kinds."""
     judged = [(said, kinds[i]) for said, i in zip(names, _home(met), strict=True) if i >= 0]
     first = sum(any(_is_same(name, kind) for name in said[:1]) for said, kind in judged)
-    among = sum(any(_is_same(name, kind) for name in said[:MOST_NAMES]) for said, kind in judged)
+    among = sum(any(_is_same(name, kind) for name in said[:MAX_NAMES]) for said, kind in judged)
     return {
         "map": len(names),
         "judged": len(judged),
         "top_1": share(first, len(judged)),
-        f"top_{MOST_NAMES}": share(among, len(judged)),
+        f"top_{MAX_NAMES}": share(among, len(judged)),
     }
 
 
@@ -59,7 +59,7 @@ def _home(met: Overlaps) -> list[int]:
         return [-1] * len(met.found)
     best = met.shared.argmax(axis=1)
     inside = met.shared.max(axis=1) / np.maximum(met.found, 1)
-    return [int(i) if holds else -1 for i, holds in zip(best, inside >= LEAST_INSIDE, strict=True)]
+    return [int(i) if holds else -1 for i, holds in zip(best, inside >= MIN_INSIDE, strict=True)]
 
 
 def _is_same(name: str, kind: str) -> bool:

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from placegraph.tools.house.space import inside
-
-F64 = NDArray[np.float64]
+from placegraph.runtime.arrays import F64, I64, Bool
+from placegraph.tools.simulator.space import inside
 
 CELL_M = 0.05
 BOUNDARY_M = 0.5  # METHOD.md, section 11
 DELTAS = tuple(round(0.1 * k, 1) for k in range(1, 10))
 
-Cells = tuple[NDArray[np.int64], NDArray[np.bool_]]
+Cells = tuple[I64, Bool]
 Area = tuple[int, F64]  # floor and outline (N, 2) in metres; areas of different floors never overlap
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.errors import SchemaError, SourceError
 from placegraph.runtime.messages import Graph, Map, Segments
 from placegraph.runtime.recording import read
@@ -19,11 +19,8 @@ from placegraph.tools.evaluate.aligned_map import NOTHING, AlignedMap, aligned
 from placegraph.tools.evaluate.house import known_of
 from placegraph.tools.evaluate.scores import map_scores
 from placegraph.tools.evaluate.trajectory import against_given, level_alignment, paired
-from placegraph.tools.house.truth import CLEAR_SHARE, TRUTH, Seen, Truth, read_truth
+from placegraph.tools.simulator.truth import CLEAR_SHARE, TRUTH, Seen, Truth, read_truth
 from placegraph.tools.view import RECORDING
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 
 PARTS = (0.25, 0.5, 0.75, 1.0)  # of the frames
 

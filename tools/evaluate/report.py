@@ -180,7 +180,7 @@ def _connections(scores: dict[str, Any]) -> list[str]:
             f"{name.ljust(11)}{row['truth']} of {row['of']} between rooms seen, {row['map']} in the map: precision "
             f"{number(row['precision'])}, recall {number(row['recall'])}, width off by {error} m"
         )
-    ratios = f"{number(travel['least_ratio'], 2)} to {number(travel['largest_ratio'], 2)}"
+    ratios = f"{number(travel['min_ratio'], 2)} to {number(travel['max_ratio'], 2)}"
     return [
         *lines,
         f"travel     {number(travel['mean_ratio'])} of the true length on average between {travel['pairs']} pairs of "

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from placegraph.tools.evaluate.aligned_map import AlignedMap, MapPlace
-from placegraph.tools.evaluate.known import Known, KnownPlace
+from placegraph.tools.evaluate.ground_truth import Known, KnownPlace
 from placegraph.tools.evaluate.objects import object_scores
 from placegraph.tools.evaluate.places import (
     BOUNDARY_M,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-F64 = NDArray[np.float64]
+from placegraph.runtime.arrays import F64
 
 
 def average_precisions(scores: F64, true: F64) -> F64:

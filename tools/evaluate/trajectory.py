@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.geometry import pose_from_quaternion
+from placegraph.runtime.vision.geometry import pose_from_quaternion
 from placegraph.tools.map_folder import read_trajectory
-
-F64 = NDArray[np.float64]
 
 RPE_M = 1.0  # of the given path between the two poses of a pair
 NEAR_NS = 20_000_000  # poses of two clocks' readings belong together; 0.02 s as in the tools of TUM RGB-D

@@ -27,14 +27,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
-from placegraph.runtime.geometry import pose_from_quaternion, quaternion_xyzw
-from placegraph.tools.evaluate.known import Known, KnownFloor, KnownObject, KnownPlace, Sight, Words
-
-F64 = NDArray[np.float64]
+from placegraph.runtime.vision.geometry import pose_from_quaternion, quaternion_xyzw
+from placegraph.tools.evaluate.ground_truth import Known, KnownFloor, KnownObject, KnownPlace, Sight, Words
 
 VERSION = 1
 FARTHEST_M = 10_000.0  # from the origin: beyond it a file is taken for one in millimetres or in map coordinates

@@ -7,35 +7,30 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from placegraph.runtime.arrays import F32, F64, I64, U8, U16, Bool
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.evaluate.detection import TrueBoxes
-from placegraph.tools.house.build import generator_version
-from placegraph.tools.house.classes import NAMES
-from placegraph.tools.train.samples import LEAST_SHARE, Shard, load_shards
-from placegraph.tools.train.views import EVALUATION_SEEDS, HEIGHT, WIDTH, render_houses
-
-U8 = NDArray[np.uint8]
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from placegraph.tools.simulator.build import generator_version
+from placegraph.tools.simulator.classes import NAMES
+from placegraph.tools.training.samples import MIN_SHARE, Shard, load_shards
+from placegraph.tools.training.views import EVALUATION_SEEDS, HEIGHT, WIDTH, render_houses
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluationView:
     """One view: color (H, W, 3) sRGB, depth (H, W) in m, instance (H, W), and its objects, each of which is `small`
-    (visible px under LEAST_SHARE of the image, as in training) or `cut` (its box touches the image's border), or not.
+    (visible px under MIN_SHARE of the image, as in training) or `cut` (its box touches the image's border), or not.
     """
 
     color: U8
     depth_m: F32
-    instance: NDArray[np.uint16]
-    items: NDArray[np.int64]  # (M,); the instance image holds item + 1
-    classes: NDArray[np.int64]  # (M,)
+    instance: U16
+    items: I64  # (M,); the instance image holds item + 1
+    classes: I64  # (M,)
     boxes: F64  # (M, 4) x0 y0 x1 y1 px
-    small: Bools  # (M,)
-    cut: Bools  # (M,)
+    small: Bool  # (M,)
+    cut: Bool  # (M,)
 
     def true_boxes(self, with_cut: bool) -> TrueBoxes:
         """Boxes to find: small ones are ignored, and cut ones unless `with_cut`."""
@@ -54,7 +49,7 @@ class EvaluationView:
         """(N, 4) px boxes of the objects that the segmenter is asked for: all that are not small."""
         return self.boxes[~self.small].astype(np.float32)
 
-    def asked_masks(self) -> list[Bools]:
+    def asked_masks(self) -> list[Bool]:
         """The visible pixels (H, W) of each of those."""
         return [np.asarray(self.instance == item + 1) for item in self.items[~self.small].tolist()]
 
@@ -86,9 +81,7 @@ def evaluation_views(shards: Sequence[Shard]) -> Iterator[EvaluationView]:
             yield evaluation_view(shard.color[k], shard.depth[k], shard.instance[k], shard.boxes[k])
 
 
-def evaluation_view(
-    color: U8, depth_mm: NDArray[np.uint16], instance: NDArray[np.uint16], rows: NDArray[np.float32]
-) -> EvaluationView:
+def evaluation_view(color: U8, depth_mm: U16, instance: U16, rows: F32) -> EvaluationView:
     """A view of a shard; rows (M, 7): item, class, x0 y0 x1 y1 (exclusive), visible px."""
     height, width = instance.shape
     boxes = rows[:, 2:6].astype(np.float64)
@@ -99,6 +92,6 @@ def evaluation_view(
         items=rows[:, 0].astype(np.int64),
         classes=rows[:, 1].astype(np.int64),
         boxes=boxes,
-        small=rows[:, 6] < LEAST_SHARE * height * width,
+        small=rows[:, 6] < MIN_SHARE * height * width,
         cut=np.asarray(((boxes[:, :2] <= 0) | (boxes[:, 2:] >= (width, height))).any(axis=1)),
     )

@@ -10,16 +10,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from placegraph.nodes.hierarchy.rooms import floor_grid
+from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.map_folder import RGB, prepare, read_cloud, read_object_clouds
 from placegraph.tools.ply import write_points
 
-F32 = NDArray[np.float32]
-U8 = NDArray[np.uint8]
 Cloud = tuple[F32, U8]  # (P, 3) metres, world frame; (P, 3) sRGB
 
 CELL_M = 0.05  # of the plan in which a point is in a room or not: that of the room layer
@@ -57,7 +55,7 @@ def _places(graph: SceneGraph, xyz: F32, rgb: U8) -> dict[str, Cloud]:
     return clouds
 
 
-def _inside(points: F32, room: Node) -> NDArray[np.bool_]:
+def _inside(points: F32, room: Node) -> Bool:
     grid = floor_grid(np.concatenate((points[:, :2], room.footprint)), CELL_M)
     mask = np.zeros(grid.shape, np.uint8)
     corners = np.round((room.footprint - grid.origin) / CELL_M - 0.5).astype(np.int32)

@@ -12,8 +12,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from placegraph.runtime.route import find_route
 from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph.route import find_route
 
 LAYERS = {"object": 2, "location": 3, "room": 4, "floor": 5, "building": 6}
 NAMES = {"object": "OBJECTS", "location": "PLACES", "room": "ROOMS", "floor": "FLOORS", "building": "BUILDINGS"}

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from placegraph.runtime.place_graph import Connection
 from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph.place_graph import Connection
 
 MARGIN_M = 0.6
 TITLE_M = 0.7

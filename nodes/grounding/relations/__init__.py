@@ -13,8 +13,9 @@ from functools import cache
 
 import numpy as np
 
-from placegraph.nodes.grounding.boxes import F64, I64, Boxes, Layout
-from placegraph.nodes.grounding.view import Views
+from placegraph.nodes.grounding.box_arrays import Boxes, Layout
+from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.node import available, plugin
 
 HOLDS = 0.5  # a relation holds from this fit on

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.boxes import F64, Boxes
+from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import Case, Fits, Relation
+from placegraph.runtime.arrays import F64
 
 THIRD = 0.25  # departs: how much the shortest side counts
 SIZE_MARGIN = 0.05  # departs: log of size; 5 % is below what boxes from a depth camera can tell

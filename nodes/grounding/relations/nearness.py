@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.boxes import F64, Boxes
+from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import Case, Fits, Relation, apart_m, flat_m, gaps_m, halving
-from placegraph.nodes.grounding.view import MIDDLE_TRUST
+from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST
+from placegraph.runtime.arrays import F64
 
 NEAR_M = 1.5  # departs: farther than about two steps nothing is "near" in a home
 AGAINST_M = 0.3  # departs: "touching" of boxes whose surfaces are some centimetres off

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.boxes import F64, Boxes
+from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import (
     Case,
     Fits,
@@ -18,6 +18,7 @@ from placegraph.nodes.grounding.relations import (
     halving,
     share_over,
 )
+from placegraph.runtime.arrays import F64
 
 CONTACT_M = 0.15  # departs: gap between what lies and what carries it, at which it is half likely to lie on it
 STANDS_SHARE = 0.5  # departs: what stands in the upper half of a box stands on it: a bed's box includes its headboard

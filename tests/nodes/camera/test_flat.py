@@ -9,8 +9,8 @@ import pytest
 
 from placegraph.nodes.camera import _flat as scene
 from placegraph.nodes.camera.flat import SOURCE, Boxes, Flat, cast_rays, rooms, truth
-from placegraph.runtime import geometry
 from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.vision import geometry
 
 SMALL = {"width": 64, "height": 48, "frames": 12}
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.camera.hm3dsem import SOURCE
-from placegraph.runtime import geometry
 from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.vision import geometry
 
 NAME = "Dd4bFSTQ8gi"
 

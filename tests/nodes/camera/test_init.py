@@ -11,9 +11,9 @@ from pydantic import ValidationError
 
 from placegraph.nodes.camera import NODE, Camera, CameraConfig, detect, find
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.runtime.geometry import backproject, transform
 from placegraph.runtime.messages import End, Frame
 from placegraph.runtime.node import Context
+from placegraph.runtime.vision.geometry import backproject, transform
 
 
 def camera(**settings: object) -> Camera:

@@ -5,11 +5,12 @@ import pytest
 
 from placegraph.nodes.camera.recorded import SOURCE
 from placegraph.runtime import messages as m
+from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SchemaError, SourceError
 from placegraph.runtime.recording import RecordingWriter
 
 
-def frame(frame_id: int, pose: m.F64) -> m.Frame:
+def frame(frame_id: int, pose: F64) -> m.Frame:
     return m.Frame(
         frame_id=frame_id,
         stamp_ns=1_000_000_007 * (frame_id + 1),

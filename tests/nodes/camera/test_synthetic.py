@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.camera.synthetic import DEPTH_UNIT_M, SOURCE, Synthetic
-from placegraph.runtime import geometry
 from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.vision import geometry
 
 SMALL = {"width": 64, "height": 48, "floors": 1, "seed": 5}
 

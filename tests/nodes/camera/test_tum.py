@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.camera.tum import SOURCE, associate
-from placegraph.runtime import geometry
 from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.vision import geometry
 
 REAL = Path(__file__).parents[4] / "shared/data/tum_fr3_cabinet"
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.fusion import NODE
-from placegraph.runtime.geometry import pose_from_quaternion
 from placegraph.runtime.messages import Detections, Keyframe, LastKeyframe
 from placegraph.runtime.node import Context, build_node
+from placegraph.runtime.vision.geometry import pose_from_quaternion
 
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "tum_fr3_cabinet"
 INTRINSICS = np.array([535.4, 539.2, 320.1, 247.6])  # its PROVENANCE.md

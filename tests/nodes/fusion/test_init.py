@@ -5,9 +5,9 @@ import pytest
 from pydantic import ValidationError
 
 from placegraph.nodes.fusion import NODE
-from placegraph.runtime.codec import encode
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Correction, LastKeyframe
+from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context
 
 SCENE = {
@@ -142,8 +142,8 @@ def test_objects_that_their_views_doubt_are_not_in_the_map(view):
         scores = np.where(np.array(segments.names) == "cup", 0.2, 0.8).astype(np.float32)
         views.append((keyframe, dataclasses.replace(segments, scores=scores)))
 
-    def names(least_score):
-        final = feed(make(least_score=least_score), views)[-1]
+    def names(min_score):
+        final = feed(make(min_score=min_score), views)[-1]
         return sorted({final.tag_names[i] for i in final.tag_offsets[:-1]})
 
     assert names(0.0) == ["chair", "cup", "table"] and names(0.3) == ["chair", "table"] and names(0.9) == []

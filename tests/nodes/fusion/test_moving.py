@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from placegraph.nodes.fusion import NODE
-from placegraph.runtime.codec import encode
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Correction, Keyframe, LastKeyframe
+from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context
 
 ROOM = {
@@ -63,7 +63,7 @@ def fused(node, views, poses=None, moved=None):
     views = list(views)
     for k, (keyframe, segments) in enumerate(views):
         pose = keyframe.world_from_camera if poses is None else poses[k]
-        if Correction in node.takes:
+        if Correction in node.inputs:
             node.step(correction(keyframe.frame_id, pose, moved if k == len(views) - 1 else None))
         node.step(keyframe)
         node.step(segments)
@@ -80,7 +80,7 @@ def strays(found, true, reach_m):
 
 
 def test_without_a_pose_graph_corrections_are_not_waited_for(view):
-    assert Correction not in make(corrected=False).takes and Correction in make().takes
+    assert Correction not in make(corrected=False).inputs and Correction in make().inputs
     plain, corrected = (fused(make(flag), orbit(view, SCENE, 6)) for flag in (False, True))
     assert names(plain) == names(corrected)
     assert np.allclose(plain.points_world, corrected.points_world, atol=0.01)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from placegraph.models_onnx.text import TextEncoder
-from placegraph.nodes.grounding.names import Names
+from placegraph.models_onnx.text_encoder import TextEncoder
+from placegraph.nodes.grounding.name_matching import Names
 from placegraph.runtime.messages import Graph, Question
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from placegraph.nodes.grounding import NODE, GroundingConfig
 from placegraph.runtime.node import Context
-from placegraph.runtime.question import MODES
+from placegraph.runtime.query.request import MODES
 
 HERE = Path(__file__).parent
 NOWHERE = (np.nan,) * 3

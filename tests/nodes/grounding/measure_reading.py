@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
-from placegraph.models_onnx.text import TextEncoder
-from placegraph.nodes.grounding.answer import Reasoner
-from placegraph.nodes.grounding.llm import LanguageModel
-from placegraph.nodes.grounding.names import Names
-from placegraph.nodes.grounding.naming import LOCATION_TYPES, ROOM_TYPES
-from placegraph.nodes.grounding.notation import read, write
-from placegraph.nodes.grounding.reading import default_adapter_path, read_by_examples, read_request
-from placegraph.nodes.grounding.schema import Thing, normal
+from placegraph.models_onnx.text_encoder import TextEncoder
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_by_examples, read_request
+from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
+from placegraph.nodes.grounding.program import Thing, normal
+from placegraph.nodes.grounding.program_syntax import read, write
+from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.errors import QueryError
+from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.train.language import examples
+from placegraph.tools.training.language import examples
 
 HERE = Path(__file__).parent
 SENTENCES = HERE.parents[2].parent / "shared" / "data" / "language" / "human_requests.jsonl"

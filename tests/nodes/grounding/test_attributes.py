@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding.attributes import BASIC_COLORS, UNKNOWN_FIT, color_fit, look, size_fit
-from placegraph.nodes.grounding.boxes import layout_of
+from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 

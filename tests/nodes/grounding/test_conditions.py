@@ -5,8 +5,8 @@ import random
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.ground import Grounder
-from placegraph.nodes.grounding.schema import CONDITIONS, MOST_DEPTH, Condition, Program, Thing
+from placegraph.nodes.grounding.program import CONDITIONS, MAX_DEPTH, Condition, Program, Thing
+from placegraph.nodes.grounding.program_executor import Grounder
 from placegraph.runtime.scene_graph import SceneGraph
 
 NOUNS = (
@@ -22,7 +22,7 @@ def random_thing(luck, depth=1):
         name = luck.choice(list(CONDITIONS))
         form = CONDITIONS[name]
         count = luck.randint(*form.things)
-        if count and depth == MOST_DEPTH:
+        if count and depth == MAX_DEPTH:
             continue
         number = {"never": 0, "may": luck.choice((0, 1, 2, 9)), "must": luck.randint(1, 9)}[form.number]
         things = tuple(random_thing(luck, depth + 1) for _ in range(count))

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding import NODE, GroundingConfig
-from placegraph.runtime.codec import encode
 from placegraph.runtime.errors import ConfigError, ModelError, SchemaError
+from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context
 from placegraph.runtime.scene_graph import SceneGraph
 
@@ -127,7 +127,7 @@ def test_the_deductive_mode_is_asked_for_by_its_name(node, ask, graph_message, h
 
 def test_a_doubtful_reading_gives_way_to_the_deductive_mode_openly(node, ask, graph_message, house, monkeypatch):
     node.step(graph_message(house))
-    monkeypatch.setattr("placegraph.nodes.grounding.answer.LEAST_CONFIDENCE", 1.1)
+    monkeypatch.setattr("placegraph.nodes.grounding.reasoner.MIN_CONFIDENCE", 1.1)
     found = ask(node, "the vase near the sofa", mode="program")
     assert any("doubtful" in sentence and "level by level" in sentence for sentence in found["evidence"])
     assert found["llm_calls"] > 1 and (found["object_id"] is None or found["object_id"] in house.nodes)

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.boxes import layout_of
+from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.nodes.grounding.groups import group_fits
-from placegraph.nodes.grounding.notation import read
+from placegraph.nodes.grounding.program_syntax import read
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from placegraph.nodes.grounding.llm import LanguageModel
-from placegraph.nodes.grounding.notation import NEVER_FIRST, read, write
-from placegraph.nodes.grounding.reading import default_adapter_path, read_request
-from placegraph.nodes.grounding.schema import ANYTHING, SAME_KIND, Thing, normal
-from placegraph.nodes.grounding.words import tokens
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_request
+from placegraph.nodes.grounding.program import ANYTHING, SAME_KIND, Thing, normal
+from placegraph.nodes.grounding.program_syntax import NEVER_FIRST, read, write
+from placegraph.runtime.language.language_model import LanguageModel
+from placegraph.runtime.language.word_forms import tokens
 
 LABELS = [json.loads(line) for line in Path(__file__).with_name("human_programs.jsonl").read_text().splitlines()]
 PROGRAMS = [(label["line"], program) for label in LABELS for program in label["programs"]]

@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from placegraph.models_onnx.load import load
-from placegraph.nodes.hierarchy.build import GraphBuilder, LayerConfig
+from placegraph.nodes.hierarchy.graph_builder import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
 from placegraph.runtime.messages import Map
 from placegraph.runtime.node import Context

@@ -8,10 +8,10 @@ import pytest
 from placegraph.nodes.fusion import NODE as FUSION
 from placegraph.nodes.hierarchy import NODE as HIERARCHY
 from placegraph.nodes.pose.gravity import find_up
-from placegraph.runtime.geometry import backproject
 from placegraph.runtime.messages import Keyframe, LastKeyframe, Segments
 from placegraph.runtime.node import Context
 from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.runtime.vision.geometry import backproject
 
 SIZE, FOCAL = (48, 64), 40.0
 INTRINSICS = np.array([FOCAL, FOCAL, 31.5, 23.5])

@@ -3,9 +3,9 @@ import pytest
 from pydantic import ValidationError
 
 from placegraph.nodes.hierarchy import NODE
-from placegraph.runtime.codec import encode
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Map, PlaceNames
+from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context
 from placegraph.runtime.scene_graph import SceneGraph
 

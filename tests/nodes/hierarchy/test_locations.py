@@ -113,7 +113,7 @@ def test_uncertain_empty_and_tiny_masks_are_none():
     assert detect([((0.8, -0.5, 2.6, 0.5), 0.1)], *PAIRS, min_score=0.2) == []
     assert detect([((0.8, 2.0, 1.6, 2.5), 0.9)], *PAIRS) == []
     assert len(detect([((0.8, -0.5, 1.6, 0.5), 0.9)], *PAIRS)) == 1
-    assert detect([((0.8, -0.5, 1.6, 0.5), 0.9)], *PAIRS, least_area_m2=2.0) == []
+    assert detect([((0.8, -0.5, 1.6, 0.5), 0.9)], *PAIRS, min_area_m2=2.0) == []
 
 
 def test_no_objects_need_no_network():

@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from placegraph.nodes.hierarchy.ground import Ground, TravelConfig
 from placegraph.nodes.hierarchy.openings import NOBODY, find_openings, owners
 from placegraph.nodes.hierarchy.rooms import Grid
+from placegraph.nodes.hierarchy.traversability import Ground, TravelConfig
 
 CONFIG = TravelConfig()
 SHAPE = (60, 120)  # 3 x 6 m

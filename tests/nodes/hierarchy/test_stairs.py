@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan
-from placegraph.nodes.hierarchy.ground import TravelConfig
 from placegraph.nodes.hierarchy.stairs import CLIMBING, find_stairs, floors_stood_on, steps_on
+from placegraph.nodes.hierarchy.traversability import TravelConfig
 
 SPANS = [FloorSpan(0.0, 2.6, -0.1, 2.9), FloorSpan(3.0, 5.6, 2.9, 6.0)]
 CONFIG = TravelConfig()

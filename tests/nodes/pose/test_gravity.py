@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.pose import gravity
-from placegraph.runtime.geometry import rotation_between
+from placegraph.runtime.vision.geometry import rotation_between
 
 UNKNOWN = np.full(3, np.nan)
 EMPTY = np.zeros((0, 3), np.float32)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.pose_graph import PoseGraphConfig, PoseGraphNode
-from placegraph.runtime.geometry import inverse, rotation_angle_rad
 from placegraph.runtime.messages import Correction, Keyframe
 from placegraph.runtime.node import Context
-from placegraph.runtime.registration import exponential
+from placegraph.runtime.vision.geometry import inverse, rotation_angle_rad
+from placegraph.runtime.vision.registration import exponential
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@ import json
 from collections import Counter
 
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.question import parse_request
+from placegraph.runtime.query.request import parse_request
 from placegraph.tools.bench.fuzz import KINDS, requests
 
 TEXTS = ["the chair near the window", "find the lamp on the table, please"]

@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.notation import read, write
-from placegraph.nodes.grounding.schema import Program
+from placegraph.nodes.grounding.program import Program
+from placegraph.nodes.grounding.program_syntax import read, write
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.evaluate.ablations import (
     VARIANTS,

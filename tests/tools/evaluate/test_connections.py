@@ -3,10 +3,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from placegraph.runtime.place_graph import Connection, Way
 from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph.place_graph import Connection, Way
 from placegraph.tools.evaluate.connections import connection_scores, match, travel_lengths
-from placegraph.tools.house.truth import HouseRun, TrueConnection, Truth
+from placegraph.tools.simulator.truth import HouseRun, TrueConnection, Truth
 
 MOVED = np.eye(4)
 MOVED[:3, 3] = (1, 2, 0.5)
@@ -59,7 +59,7 @@ def test_a_perfect_map_is_perfect():
         row = found[what]
         assert (row["truth"], row["of"], row["map"], row["precision"], row["recall"]) == (count, count, count, 1, 1)
         assert row["width_error_m"] == pytest.approx(0.1)
-    assert found["travel"] == {"pairs": 1, **dict.fromkeys(("mean_ratio", "least_ratio", "largest_ratio"), 1.1)}
+    assert found["travel"] == {"pairs": 1, **dict.fromkeys(("mean_ratio", "min_ratio", "max_ratio"), 1.1)}
 
 
 def test_false_missed_unseen_and_doubled_doors():
@@ -95,8 +95,8 @@ def test_travel_goes_through_any_room_of_the_floor_by_the_shortest_way():
 
 def test_a_truth_without_connections_is_not_scored(cli, tmp_path: Path):
     """Houses made before doors were truth are still scored for all else."""
-    from placegraph.tools.house.build import build
-    from placegraph.tools.house.truth import read_truth, truth_of, write_truth
+    from placegraph.tools.simulator.build import build
+    from placegraph.tools.simulator.truth import read_truth, truth_of, write_truth
 
     made = truth_of(build(5, 1), HouseRun(5, 1, 4, 64, 48, "", 4), ())
     write_truth(made.__class__(**{**vars(made), "objects": (), "connections": None}), tmp_path)

@@ -75,7 +75,7 @@ def test_a_true_box_is_found_once() -> None:
 def test_the_overlap_decides() -> None:
     half = [0, 0, 10, 5]  # IoU .5 exactly
     assert ap(found((half, 0, 0.9)), true((A, 0))) == pytest.approx(1)
-    assert ap(found((half, 0, 0.9)), true((A, 0)), least_iou=0.51) == 0
+    assert ap(found((half, 0, 0.9)), true((A, 0)), min_iou=0.51) == 0
 
 
 def test_on_an_ignored_truth_a_box_is_neither_right_nor_wrong() -> None:

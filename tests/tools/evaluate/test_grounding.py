@@ -6,7 +6,7 @@ import pytest
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.grounding import Reply, ask_all, eye_in_map, grounding_scores, read_questions
-from placegraph.tools.house.questions import AskedQuestion, to_json
+from placegraph.tools.simulator.questions import AskedQuestion, to_json
 
 BOX = np.array([[0.0, 0, 0], [1, 1, 1]])
 

@@ -7,18 +7,18 @@ from scipy.spatial.transform import Rotation
 
 from placegraph.nodes.camera.tum import SOURCE as TUM
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.geometry import inverse, transform
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.vision.geometry import inverse, transform
 from placegraph.tools.evaluate.aligned_map import read_aligned
-from placegraph.tools.evaluate.house import HOUSE_WORDS, LEAST_FRAMES, known_of, sight_of
-from placegraph.tools.house.build import build
-from placegraph.tools.house.classes import CLASSES
-from placegraph.tools.house.export import HouseOrder, export
-from placegraph.tools.house.questions import AskedQuestion, to_json
-from placegraph.tools.house.truth import Seen, read_truth, truth_of, write_truth
+from placegraph.tools.evaluate.house import HOUSE_WORDS, MIN_FRAMES, known_of, sight_of
 from placegraph.tools.map_folder import read_object_clouds, write_trajectory
 from placegraph.tools.ply import write_points
+from placegraph.tools.simulator.build import build
+from placegraph.tools.simulator.classes import CLASSES
+from placegraph.tools.simulator.export import HouseOrder, export
+from placegraph.tools.simulator.questions import AskedQuestion, to_json
+from placegraph.tools.simulator.truth import Seen, read_truth, truth_of, write_truth
 
 ORDER = HouseOrder(seed=5, floors=1, limit=4, width=64, height=48)
 MAP_FROM_TRUE = np.eye(4)
@@ -32,7 +32,7 @@ def source(tmp_path_factory):
     folder = tmp_path_factory.mktemp("house") / "made"
     run = export(ORDER, folder, workers=1)
     house = build(ORDER.seed, ORDER.floors)
-    seen = tuple(Seen(item.id, LEAST_FRAMES, LEAST_FRAMES) for item in house.items)
+    seen = tuple(Seen(item.id, MIN_FRAMES, MIN_FRAMES) for item in house.items)
     write_truth(truth_of(house, run, seen), folder)
     return folder
 
@@ -200,8 +200,8 @@ def test_without_truth_the_house_options_are_refused(cli, perfect, source, tmp_p
 
 
 def test_seen_well_needs_frames_and_pixels() -> None:
-    assert sight_of(Seen(0, 99, LEAST_FRAMES)) == "well"
-    assert sight_of(Seen(0, 99, LEAST_FRAMES - 1)) == "poorly" and sight_of(Seen(0, 0, 0)) == "never"
+    assert sight_of(Seen(0, 99, MIN_FRAMES)) == "well"
+    assert sight_of(Seen(0, 99, MIN_FRAMES - 1)) == "poorly" and sight_of(Seen(0, 0, 0)) == "never"
 
 
 def test_every_word_has_one_class() -> None:

@@ -17,9 +17,9 @@ from placegraph.tools.evaluate.perception import (
     tag_scores,
 )
 from placegraph.tools.evaluate.views import evaluation_shards, evaluation_view, evaluation_views, shard_folder
-from placegraph.tools.house.classes import CLASSES, NAMES
-from placegraph.tools.train.samples import LEAST_SHARE
-from placegraph.tools.train.views import EVALUATION_SEEDS, visible_boxes
+from placegraph.tools.simulator.classes import CLASSES, NAMES
+from placegraph.tools.training.samples import MIN_SHARE
+from placegraph.tools.training.views import EVALUATION_SEEDS, visible_boxes
 
 CUP, LAMP, SOFA = NAMES.index("cup"), NAMES.index("lamp"), NAMES.index("sofa")
 ITEM_CLASS = np.array([CUP, LAMP, SOFA, CUP], np.uint8)
@@ -116,7 +116,7 @@ def test_what_a_view_asks_for() -> None:
 
 def test_a_class_of_which_only_a_speck_is_seen_is_unknown() -> None:
     image = np.zeros((100, 100), np.uint16)
-    least = int(LEAST_SHARE * 100 * 100)
+    least = int(MIN_SHARE * 100 * 100)
     image[50, 10 : 10 + least], image[70, 10 : 10 + least - 1] = 1, 2
     view = evaluation_view(
         np.zeros((100, 100, 3), np.uint8), np.zeros((100, 100), np.uint16), image, visible_boxes(image, ITEM_CLASS)

@@ -3,10 +3,10 @@ import pytest
 
 from placegraph.runtime.scene_graph import Tag
 from placegraph.tools.evaluate.aligned_map import MapObject
+from placegraph.tools.evaluate.ground_truth import KnownObject, Words
 from placegraph.tools.evaluate.house import HOUSE_WORDS
-from placegraph.tools.evaluate.known import KnownObject, Words
 from placegraph.tools.evaluate.objects import object_scores, top_k
-from placegraph.tools.house.classes import NAMES
+from placegraph.tools.simulator.classes import NAMES
 
 
 def box(x, size=(1.0, 1.0, 1.0), y=0.0):

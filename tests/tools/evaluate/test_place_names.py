@@ -7,8 +7,8 @@ from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.tools.evaluate.aligned_map import NOTHING, AlignedMap, MapPlace
 from placegraph.tools.evaluate.place_names import name_scores, place_name_scores
 from placegraph.tools.evaluate.places import overlaps
-from placegraph.tools.house.build import build
-from placegraph.tools.house.truth import HouseRun, Seen, truth_of
+from placegraph.tools.simulator.build import build
+from placegraph.tools.simulator.truth import HouseRun, Seen, truth_of
 
 
 def square(x, side=1.0):

@@ -3,7 +3,7 @@ import pytest
 
 from placegraph.runtime.scene_graph import Tag
 from placegraph.tools.evaluate.aligned_map import NOTHING, AlignedMap, MapObject, MapPlace
-from placegraph.tools.evaluate.known import Known, KnownFloor, KnownObject, KnownPlace, Words
+from placegraph.tools.evaluate.ground_truth import Known, KnownFloor, KnownObject, KnownPlace, Words
 from placegraph.tools.evaluate.scores import map_scores
 
 BOX = np.array([[0.0, 0, 0], [1, 1, 1]])

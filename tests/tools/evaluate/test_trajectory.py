@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from placegraph.nodes.camera import detect
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.geometry import inverse, transform
 from placegraph.runtime.messages import Pose
+from placegraph.runtime.vision.geometry import inverse, transform
 from placegraph.tools.evaluate import absolute_trajectory_error, against_given
 from placegraph.tools.evaluate.trajectory import (
     at_times,

@@ -5,7 +5,7 @@ import pytest
 
 from placegraph.runtime.errors import SourceError
 from placegraph.tools.evaluate import truth_file
-from placegraph.tools.evaluate.known import Known, KnownFloor, KnownObject, KnownPlace, Words
+from placegraph.tools.evaluate.ground_truth import Known, KnownFloor, KnownObject, KnownPlace, Words
 from placegraph.tools.evaluate.truth_file import read_truth_file, write_truth_file
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]

@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from placegraph.runtime.place_graph import Connection
 from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph.place_graph import Connection
 from placegraph.tools.export import dsg, svg
 from placegraph.tools.map_folder import read_cloud, read_object_clouds
 from placegraph.tools.ply import write_points

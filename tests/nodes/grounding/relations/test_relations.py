@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.boxes import layout_of
+from placegraph.nodes.grounding.box_arrays import layout_of
+from placegraph.nodes.grounding.program import CONDITIONS
 from placegraph.nodes.grounding.relations import HOLDS, Case, families, triggers
-from placegraph.nodes.grounding.schema import CONDITIONS
-from placegraph.nodes.grounding.view import Views
+from placegraph.nodes.grounding.viewpoint import Views
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 SOUTH = np.array([0.0, -5.0, 1.5])  # looking north: left is -x

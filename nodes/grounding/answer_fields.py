@@ -1,0 +1,138 @@
+"""The fields of an answer: what was found with its reasons and the way to it, or why there is nothing.
+
+Source: paper, "Object Grounding". Departs: evidence, candidates and approach beside the object.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.program import Thing
+from placegraph.nodes.grounding.program_executor import Grounder
+from placegraph.nodes.grounding.ranking import Candidate, Ranking
+from placegraph.runtime.arrays import F64
+from placegraph.runtime.messages import Question
+from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph.place_graph import approach_to_dict
+from placegraph.runtime.scene_graph.route import find_route
+
+NO_WAY: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
+
+
+def found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure: bool) -> dict[str, Any]:
+    """The fields that say what the best candidate is; the ranking holds at least one."""
+    best = ranking.candidates[0]
+    view = grounder.viewpoint(best.node)
+    return {
+        "status": "found",
+        "object_id": best.node.id,
+        "name": best.node.name,
+        "box": numbers(best.node.box),
+        "center": numbers(best.node.center),
+        "path": [{"id": step.id, "layer": step.layer, "name": step.name} for step in graph.path(best.node.id)],
+        "evidence": [*ranking.notes, *best.evidence],
+        "candidates": [_candidate(candidate) for candidate in ranking.candidates[:k]],
+        "sure": sure,
+        **_way_to(graph, best.node, grounder.asker_world),
+        "viewpoint": {"source": view.source, "xyz": numbers(view.xyz_world)},
+    }
+
+
+def not_in_map(graph: SceneGraph, target: Thing, ranking: Ranking, grounder: Grounder, names: Names) -> dict[str, Any]:
+    """The fields that say that nothing fits, and what is there instead."""
+    noun = "" if target.noun == "thing" else target.noun
+    objects = graph.layer("object")
+    where = " there" if any(one.kind == "place" for one in target.conditions) else " in the map"
+    missing = f"is called {noun}" if noun else "fits the question"
+    evidence = [*ranking.notes, f"nothing{where} {missing}"]
+    elsewhere = names.named(noun, objects) if noun else []
+    if elsewhere:
+        listed = [f"{fit.node.name} {fit.node.id} in {_place(graph, fit.node)}" for fit in elsewhere[:5]]
+        evidence.append(f"elsewhere: {'; '.join(listed)}")
+    else:
+        nearest = names.nearest(noun, objects)
+        evidence.append(f"the nearest names in the map: {', '.join(nearest) or 'none'}")
+    view = grounder.viewpoint(graph.building)
+    return {
+        "status": "not_in_map",
+        "object_id": None,
+        "name": None,
+        "box": None,
+        "center": None,
+        "path": [],
+        "evidence": evidence,
+        "candidates": [],
+        "sure": ranking.sure and not elsewhere,
+        **NO_WAY,
+        "viewpoint": {"source": view.source, "xyz": numbers(view.xyz_world)},
+    }
+
+
+def error_answer(question: Question, revision: int, reason: str) -> dict[str, Any]:
+    """The fields of an answer that says why there is none."""
+    asker = question.viewpoint_world
+    given = bool(np.isfinite(asker).all())
+    return {
+        "status": "error",
+        "error": reason,
+        "question": question.text,
+        "question_id": question.question_id,
+        "object_id": None,
+        "name": None,
+        "box": None,
+        "center": None,
+        "path": [],
+        "evidence": [],
+        "candidates": [],
+        "sure": False,
+        **NO_WAY,
+        "viewpoint": {"source": "asker", "xyz": numbers(asker)} if given else None,
+        "parse": None,
+        "revision": revision,
+        "llm_calls": 0,
+    }
+
+
+def to_json(fields: dict[str, Any]) -> str:
+    """Canonical JSON: sorted keys, no spaces; equal answers give equal bytes."""
+    return json.dumps(fields, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def _way_to(graph: SceneGraph, node: Node, asker_world: F64) -> dict[str, Any]:
+    """Where to stand before a node, and how the asker gets there: rooms and connections in turn, metres.
+
+    To an object that cannot be approached the way into its room, as far as its middle; 0 m for who is there already.
+    """
+    approach = approach_to_dict(node.approach)
+    way = NO_WAY | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
+    if not np.isfinite(asker_world).all():
+        return way
+    room = graph.room_of(node.id)
+    route = find_route(graph, asker_world, node.id) or (find_route(graph, asker_world, room) if room else None)
+    if route is None:
+        return way
+    return way | {"route": list(route.ids), "travel_m": numbers(route.length_m)}
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "id": candidate.node.id,
+        "name": candidate.node.name,
+        "score": round(candidate.score, 4),
+        "evidence": candidate.evidence,
+    }
+
+
+def numbers(values: Any) -> Any:
+    """Plain numbers to 1 mm."""
+    # adding 0.0 turns -0.0 into 0.0, so that equal answers print alike
+    return (np.round(np.asarray(values, float), 3) + 0.0).tolist()
+
+
+def _place(graph: SceneGraph, node: Node) -> str:
+    parent = graph.nodes[node.parent]
+    return f"{parent.name} {parent.id}"

@@ -1,0 +1,181 @@
+"""A question cut into pieces: things, relations, places, ordinals and breaks, in the order they are said.
+
+Longest trigger phrases win; the words between triggers and filler words are noun phrases.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from placegraph.nodes.grounding.attributes import COLORS
+from placegraph.nodes.grounding.relations import triggers
+from placegraph.runtime.language.word_forms import is_plural, normal_form, singular, tokens, words_of
+
+FILLER = words_of("filler.txt")
+ANYTHING = frozenset(
+    (
+        "thing",
+        "things",
+        "something",
+        "anything",
+        "object",
+        "objects",
+        "item",
+        "items",
+        "furniture",
+        "stuff",
+        "everything",
+    )
+)
+WHOLE_MAP = frozenset(
+    ("house", "home", "building", "apartment", "flat", "map", "scene", "place", "room", "world", "environment")
+)
+ORDINALS = {
+    "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5, "sixth": 6, "seventh": 7, "eighth": 8, "ninth": 9,
+    "1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5, "6th": 6, "7th": 7, "8th": 8, "9th": 9,
+}  # fmt: skip
+FLOOR_WORDS = frozenset(("floor", "level", "storey", "story"))
+FLOOR_KINDS = frozenset(("ground", "top", "upper", "lower", "lowest", "highest", "bottom", "main", "last")) | frozenset(
+    ORDINALS
+)
+BREAKS = frozenset(",.;:?!")
+CANS = frozenset(("trash", "garbage", "waste", "recycling", "recycle", "rubbish", "watering"))  # what is a can
+VIEWS = {
+    tuple(phrase.split()): "from"
+    for phrase in ("seen from", "as seen from", "when seen from", "viewed from", "when viewed from", "looking from")
+}
+SIDES = {"left": "leftmost", "right": "rightmost", "middle": "middle"}
+IDIOMS = (
+    "i left", "we left", "you left", "left my", "have left", "on it", "at home",
+    "over there", "in here", "turn on", "turned on", "which room", "what room", "which floor",
+    "what floor", "take a look at", "look at", "what color", "next time", "is left", "in order",
+    "so that", "by the way", "go to", "from where i stand", "from where i am", "from here",
+)  # fmt: skip
+
+# Only these are taken off a noun: a "low table" and a "high chair" are things of their own.
+SIZES = {"big": "large", "large": "large", "huge": "large", "small": "small", "little": "small", "tiny": "small"}
+
+OWNS = r"\b(?:that |which )?(?:has|have|with|holds|holding|carries|carrying) (.{1,60}?) "
+TURNED = (
+    (re.compile(OWNS + r"(?:on|on top of) it\b", re.IGNORECASE), r"holding \1"),
+    (re.compile(OWNS + r"on top\b(?! of)", re.IGNORECASE), r"holding \1"),
+    (re.compile(OWNS + r"(?:next to|near|beside|by) it\b", re.IGNORECASE), r"near \1"),
+    (re.compile(OWNS + r"(?:above|over) it\b", re.IGNORECASE), r"under \1"),
+    (re.compile(OWNS + r"(?:under|below|underneath) it\b", re.IGNORECASE), r"above \1"),
+    (re.compile(r"\bwithout (.{1,60}?)(?: on it| on top)?(?=[,.?!]|$)", re.IGNORECASE), r"not holding \1"),
+    (re.compile(OWNS + r"(?:in|inside) it\b", re.IGNORECASE), r"holding \1"),
+)
+
+
+@dataclass
+class Piece:
+    """One piece: `kind` is thing, relation, floor, ordinal, and, not, or break."""
+
+    kind: str
+    text: str = ""
+    color: str = ""
+    size: str = ""
+    plural: bool = False
+    number: int = 0
+    words: list[str] = field(default_factory=list)
+
+
+def turned(text: str) -> str:
+    """Turn round the conditions that are told of the anchor: "with the lamp on it" becomes "under the lamp"."""
+    for pattern, replacement in TURNED:
+        text = pattern.sub(replacement, text)
+    return text
+
+
+def cut(text: str) -> list[Piece]:
+    """Cut a question into pieces; filler words vanish but end a noun phrase."""
+    words, pieces, i = tokens(turned(text)), [], 0
+    phrases = triggers() | VIEWS
+    longest = max(map(len, phrases))
+    idioms = [tuple(idiom.split()) for idiom in IDIOMS]
+    pending: list[str] = []
+
+    def flush() -> None:
+        if pending:
+            pieces.extend(_things(pending))
+            pending.clear()
+
+    while i < len(words):
+        idiom = next((idiom for idiom in idioms if words[i : i + len(idiom)] == idiom), None)
+        floor = _floor(words, i)
+        size = next((n for n in range(longest, 0, -1) if words[i : i + n] in phrases), 0)
+        if idiom and len(idiom) >= size:
+            flush()
+            i += len(idiom)
+        elif floor:
+            flush()
+            pieces.append(Piece("floor", floor[1]))
+            i += floor[0]
+        elif size:
+            flush()
+            pieces.append(Piece("relation", phrases[words[i : i + size]], words=list(words[i : i + size])))
+            i += size
+        else:
+            i += 1
+            _single(words[i - 1], words[i] if i < len(words) else "", pending, pieces, flush)
+    flush()
+    return pieces
+
+
+def _single(word: str, following: str, pending: list[str], pieces: list[Piece], flush: object) -> None:
+    """File one word that starts no phrase."""
+    assert callable(flush)
+    if word in BREAKS:
+        flush()
+        pieces.append(Piece("break"))
+    elif word in ("and", "not", "isn't", "aren't"):
+        flush()
+        pieces.append(Piece("and" if word == "and" else "not"))
+    elif word in ORDINALS:
+        flush()
+        pieces.append(Piece("ordinal", number=ORDINALS[word]))
+    elif word in SIDES and following and following not in FILLER and following not in BREAKS:
+        flush()
+        pieces.append(Piece("relation", SIDES[word]))  # "the left chair", "the middle one"
+    elif word in ("to", "from") and not pending:
+        pieces.append(Piece("to"))
+    elif word in ("to", "from"):
+        flush()
+        pieces.append(Piece("to"))
+    elif word == "can" and pending and pending[-1] in CANS:
+        pending.append(word)
+    elif word in FILLER:
+        flush()
+    else:
+        pending.append(word)
+
+
+def _floor(words: tuple[str, ...], i: int) -> tuple[int, str] | None:
+    """Length and text of the floor phrase that starts at word i."""
+    skip = 0
+    while words[i + skip : i + skip + 1] and words[i + skip] in ("on", "at", "in", "the", "from", "of") and skip < 2:
+        skip += 1
+    rest = words[i + skip : i + skip + 2]
+    if rest[:1] and rest[0] in ("upstairs", "downstairs"):
+        return skip + 1, rest[0]
+    if len(rest) == 2 and rest[0] in FLOOR_KINDS and rest[1] in FLOOR_WORDS:
+        return skip + 2, f"{rest[0]} floor"
+    if len(rest) == 2 and rest[0] in FLOOR_WORDS and rest[1].isdigit():
+        return skip + 2, f"floor {int(rest[1])}"
+    return None
+
+
+def _things(words: list[str]) -> list[Piece]:
+    """A run of content words as a noun phrase with its colour and size taken off."""
+    noun = [word for word in words if word not in COLORS and word not in SIZES]
+    color = next((COLORS[word] for word in words if word in COLORS), "")
+    size = next((SIZES[word] for word in words if word in SIZES), "")
+    if noun and all(word in ANYTHING for word in noun):
+        return [Piece("thing", "", color, size, plural=singular(noun[-1]) != noun[-1], words=["thing"])]
+    if not noun:
+        # "the red one", "which is the orange": the colour word is all there is
+        return [Piece("thing", "", color, size, words=list(words))]
+    kept = [word for word in noun if word not in ANYTHING]
+    text = " ".join(kept)
+    return [Piece("thing", normal_form(text), color, size, is_plural(text), words=kept)]

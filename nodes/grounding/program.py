@@ -1,0 +1,148 @@
+"""The typed program that a request is read into: a thing to find and the conditions on it, nested.
+
+One schema for all that people say of an object (target, attributes, anchors with conditions of their own, relations,
+negation, ordinals, superlatives, groups, viewpoints, room, floor). Source: METHOD section 10, step 1; the conventions
+of `CONDITIONS` come from reading 400 requests of people (Nr3D). Departs: the paper has targets and anchors only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from placegraph.runtime.language.word_forms import normal_form
+
+ANYTHING = "thing"  # the noun of what has no name of its own: "something under the bed"
+SAME_KIND = "one"  # the noun of an anchor of the target's own kind: "next to the big one", "far from the others"
+MAX_DEPTH = 4  # departs: things within things; people go three deep
+MAX_CONDITIONS = 8  # departs: of one thing; the longest request of people read so far has five
+
+Kind = Literal["look", "group", "relation", "rank", "view", "place", "purpose"]
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a condition of one name holds: fewest and most things, whether words or a number, and what it means."""
+
+    kind: Kind
+    things: tuple[int, int]
+    meaning: str
+    words: bool = False
+    number: Literal["never", "may", "must"] = "never"
+
+
+CONDITIONS: dict[str, Form] = {
+    "is": Form("look", (0, 0), "colour, size, material, shape or state, as said: red, big, wooden, round, open", True),
+    "count": Form("group", (0, 0), "is one of so many; of an anchor: there are so many", number="must"),
+    "alone": Form("group", (0, 0), "by itself, away from its like"),
+    "near": Form("relation", (1, 1), "next to, beside, by, close to, at, around it"),
+    "on": Form("relation", (1, 1), "on, on top of, hanging on"),
+    "under": Form("relation", (1, 1), "under, below, beneath"),
+    "above": Form("relation", (1, 1), "above, over"),
+    "in": Form("relation", (1, 1), "inside of a thing (of a room: room)"),
+    "holds": Form("relation", (1, 1), "has it on top or inside"),
+    "with": Form("relation", (1, 1), "with, has, as a part or beside it"),
+    "left": Form("relation", (1, 1), "left of it, on its left side"),
+    "right": Form("relation", (1, 1), "right of it, on its right side"),
+    "front": Form("relation", (1, 1), "in front of it"),
+    "behind": Form("relation", (1, 1), "behind it, at the back of it"),
+    "across": Form("relation", (1, 1), "across from, opposite of it"),
+    "against": Form("relation", (1, 1), "against, touching it"),
+    "end": Form("relation", (1, 1), "at the end, foot or head of it"),
+    "along": Form("relation", (1, 1), "on the same wall or side of the room as it"),
+    "facing": Form("relation", (1, 1), "turned towards it"),
+    "between": Form("relation", (1, 2), "between two things, or those of one kind"),
+    "corner": Form("relation", (0, 1), "in a corner of the room, or of the thing"),
+    "center": Form("relation", (0, 1), "in the middle of the room, or of the thing"),
+    "closest": Form("rank", (0, 1), "closest, nearest, closer; without a thing: to the viewer", number="may"),
+    "farthest": Form("rank", (0, 1), "farthest, far from, away from; without a thing: from the viewer", number="may"),
+    "leftmost": Form("rank", (0, 0), "the left one, on the left, first from the left", number="may"),
+    "rightmost": Form("rank", (0, 0), "the right one, on the right, second from the right: 2", number="may"),
+    "frontmost": Form("rank", (0, 0), "the front one", number="may"),
+    "backmost": Form("rank", (0, 0), "the back one, at the back", number="may"),
+    "middle": Form("rank", (0, 0), "the middle one of several"),
+    "nth": Form("rank", (0, 0), "the first, second, third with no side named", number="must"),
+    "largest": Form("rank", (0, 0), "largest, larger, biggest", number="may"),
+    "smallest": Form("rank", (0, 0), "smallest, smaller", number="may"),
+    "tallest": Form("rank", (0, 0), "tallest, taller", number="may"),
+    "shortest": Form("rank", (0, 0), "shortest, shorter", number="may"),
+    "longest": Form("rank", (0, 0), "longest, longer, widest, wider", number="may"),
+    "highest": Form("rank", (0, 0), "highest, upper, top", number="may"),
+    "lowest": Form("rank", (0, 0), "lowest, lower, bottom", number="may"),
+    "looking": Form("view", (1, 1), "seen by one who faces it: facing, looking at, from the foot of it"),
+    "from": Form("view", (1, 1), "seen from it: standing at it, entering by it, lying on it"),
+    "back": Form("view", (1, 1), "seen with the back to it"),
+    "room": Form("place", (1, 1), "in a room or area: bathroom, work area, second bedroom"),
+    "floor": Form("place", (0, 0), "on a floor of the building, as said: upstairs, second floor", True),
+    "for": Form("purpose", (0, 0), "what the thing is used for, as said: sit on", True),
+}
+RANKS = tuple(name for name, form in CONDITIONS.items() if form.kind == "rank")
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
+
+
+class Condition(_Part):
+    """One thing that is said of a thing. `number`: 2 for "second from the left", 3 for "one of the three"; 0 unsaid."""
+
+    name: str
+    things: tuple[Thing, ...] = ()
+    words: str = ""
+    number: int = 0
+    negated: bool = False
+
+    @model_validator(mode="after")
+    def _check(self) -> Condition:
+        form = CONDITIONS.get(self.name)
+        if form is None:
+            raise ValueError(f"there is no condition {self.name!r}")
+        if not form.things[0] <= len(self.things) <= form.things[1]:
+            raise ValueError(f"{self.name} takes {form.things[0]} to {form.things[1]} things, not {len(self.things)}")
+        if form.words != bool(self.words):
+            raise ValueError(f"{self.name} takes {'words' if form.words else 'no words'}")
+        if (form.number == "must" and self.number < 1) or (form.number == "never" and self.number):
+            raise ValueError(f"{self.name} takes {'a number from 1' if form.number == 'must' else 'no number'}")
+        return self
+
+    @property
+    def kind(self) -> Kind:
+        """What sort of condition it is."""
+        return CONDITIONS[self.name].kind
+
+
+class Thing(_Part):
+    """A noun as said ("" or ANYTHING: whatever fits; SAME_KIND: of the target's kind) and what is said of it."""
+
+    noun: str = ""
+    conditions: tuple[Condition, ...] = ()
+
+    def said(self, name: str) -> Iterator[Condition]:
+        """The conditions of one name, in order."""
+        return (condition for condition in self.conditions if condition.name == name)
+
+
+class Program(_Part):
+    """A request: the thing to find. Views, room, floor and purpose are conditions of the target."""
+
+    target: Thing
+
+
+def normal(thing: Thing) -> Thing:
+    """The same request in one form: nouns singular, conditions in order of their text, ranks numbered from 1.
+
+    Two readings of a request are the same when their normal forms are equal.
+    """
+    conditions = []
+    for condition in thing.conditions:
+        number = condition.number or int(CONDITIONS[condition.name].number == "may")
+        things = tuple(normal(inner) for inner in condition.things)
+        if condition.name == "between":
+            things = tuple(sorted(things, key=repr))
+        words = normal_form(condition.words).replace("grey", "gray")
+        conditions.append(condition.model_copy(update={"things": things, "words": words, "number": number}))
+    noun = "" if thing.noun in ("", ANYTHING) else normal_form(thing.noun)
+    return Thing(noun=noun, conditions=tuple(sorted(conditions, key=repr)))

@@ -1,0 +1,98 @@
+"""Left, right, in front of and behind an anchor, and across from it, as seen along the line of sight to it.
+
+Source: METHOD section 9; left and right of a thing with a front are those of one who faces its front, as in Sr3D.
+Departs: margins, so that what is straight ahead is neither left nor right; nearness counts, as people use these words.
+Where nobody says who looks, "in front of" and "behind" fall back on nearness (of 2,206 human sentences nearest fits
+best) and left and right count less.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from placegraph.nodes.grounding.relations import Case, Fits, Relation, apart_m, gaps_m, halving
+from placegraph.runtime.arrays import F64
+
+MARGIN_M = 0.1  # departs: about the error of a box centre from a depth camera
+SIDE_SHARE = 0.26  # departs: within 15 degrees of the line of sight nothing is left or right: there the fit is a half
+WITHIN = 0.1  # departs: how much what is within an anchor's width counts towards its side
+SIDE_M, FRONT_M = 3.0, 1.5  # departs: "left of the sofa" means beside it, not anywhere in that half of the room
+MILD = 0.75  # departs: how well what is close by on the other side is "in front", when nobody said who looks
+ACROSS_M = 0.8  # departs: what is nearer is beside, not across
+DEGREES_45 = 0.7
+
+
+def judge(case: Case) -> Fits:
+    """All pairs."""
+    anchors = case.anchors
+    assert anchors is not None
+    lines = case.views.toward(anchors)
+    offset = (case.targets.center[:, None] - anchors.center[None])[..., :2]
+    left = np.einsum("nmk,mk->nm", offset, lines.left)
+    ahead = np.einsum("nmk,mk->nm", offset, lines.forward)
+    gap = apart_m(gaps_m(case.targets, anchors))
+    half = anchors.size[:, :2] / 2
+    deep = np.einsum("mk,mk->m", np.abs(lines.forward), half)
+    wide = np.einsum("mk,mk->m", np.abs(lines.left), half)
+    blind = np.asarray(~lines.forward.any(axis=1))
+    if case.relation in ("left", "right"):
+        main = left if case.relation == "left" else -left
+        share = _share(main, wide, np.abs(ahead) - deep)
+        values = np.where(blind, 0.5, share) * halving(gap, SIDE_M)
+    elif case.relation in ("front", "behind"):
+        main = ahead if case.relation == "behind" else -ahead
+        share = _share(main, deep, np.abs(left) - wide)
+        unsaid = lines.trust < 1
+        mild = MILD + (1 - MILD) * share
+        values = np.where(unsaid | blind, np.where(blind, MILD, mild), share) * halving(gap, FRONT_M)
+    else:
+        share = -ahead / np.maximum(np.linalg.norm(offset, axis=2), 1e-9)
+        straight = halving(np.maximum(np.abs(left) - wide, 0), 2.0)
+        values = np.clip(0.5 + (share - DEGREES_45), 0, 1) * np.clip(gap / (2 * ACROSS_M), 0, 1) * straight
+
+    def sentence(i: int, j: int) -> str:
+        a, b = case.targets.labels[i], anchors.labels[j]
+        seen = f"seen from the {lines.sources[j]}"
+        if blind[j]:
+            return f"{b} is at the {lines.sources[j]}, from where it has no sides; {a} is {gap[i, j]:.2f} m from it"
+        if case.relation in ("left", "right"):
+            side = "left" if left[i, j] > 0 else "right"
+            return f"{a} is {abs(left[i, j]):.2f} m to the {side} of {b}, {seen}"
+        side = "farther than" if ahead[i, j] > 0 else "nearer than"
+        return f"{a} is {abs(ahead[i, j]):.2f} m {side} {b} {seen} and {gap[i, j]:.2f} m from it"
+
+    trust = float(lines.trust.max()) if len(anchors) and case.relation in ("left", "right") else 1.0
+    return Fits(values, sentence, trust=trust)
+
+
+def _share(main: F64, half: F64, cross: F64) -> F64:
+    """Fit 0..1 of a direction: 1 from 45 degrees on, a half at 15, none on the other side.
+
+    main (n, m): metres that way from the anchor's middle, half (m,) of them within it; cross (n, m): metres beyond its
+    edge to the other way: what stands before the left end of a sofa is before it, and hardly to its left.
+    """
+    beyond = np.maximum(main - half, 0) + WITHIN * np.maximum(main, 0)
+    share = np.where(main > 0, beyond / np.maximum(np.hypot(beyond, np.maximum(cross, 0)), 1e-9), -1.0)
+    fit = np.clip(0.5 + (share - SIDE_SHARE) * 0.5 / (DEGREES_45 - SIDE_SHARE), 0.0, 1.0)
+    return np.asarray(fit * np.clip(main / MARGIN_M - 0.5, 0, 1))
+
+
+RELATION = Relation(
+    phrases={
+        "left": (
+            "left of", "to the left of", "on the left of", "on the left side of", "left side of",
+            "to the left side of", "at the left of", "on the left hand side of", "left from",
+        ),
+        "right": (
+            "right of", "to the right of", "on the right of", "on the right side of", "right side of",
+            "to the right side of", "at the right of", "on the right hand side of", "right from",
+        ),
+        "front": ("in front of", "in the front of", "before", "directly in front of", "right in front of"),
+        "behind": ("behind", "in back of", "at the back of", "in the back of", "to the rear of", "directly behind"),
+        "across": (
+            "facing", "opposite", "opposite to", "across from", "opposite of", "across the room from",
+            "directly across from",
+        ),
+    },
+    judge=judge,
+)  # fmt: skip

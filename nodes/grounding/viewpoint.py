@@ -1,0 +1,207 @@
+"""From where left, right, front and behind are meant: a view that the request names, the asker's, or the room's.
+
+Source: METHOD section 9 (viewpoint c, f = (a - c) / |a - c|, l = z x f). Departs: who faces a thing stands square
+before it, so that the line of sight is one of its axes; and a thing with a front of its own is seen from there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from placegraph.nodes.grounding.box_arrays import Boxes, Layout
+from placegraph.runtime.arrays import F64
+
+WALL_M = 0.5  # departs: what stands so close to a wall has its back to it
+ELONGATED = 1.4  # departs: from this ratio of its sides on, a thing has a broad side that people face
+LONG_ENOUGH = 1.1  # departs: the same for beds, which have a foot however wide they are
+LONG_FACED = ("bed", "couch bed", "bunk bed", "bathtub", "crib")  # faced along their long side, from the foot
+AT_ROOM_M = 1.5  # departs: what one may stand at belongs to a room within this, through its wall
+MIDDLE_TRUST = 0.5  # departs: nobody said where the viewer is; the room's centre is right more often than not
+SAME_WAY = 0.9  # departs: cosine of lines of sight that look at the same wall
+MAX_FACED = 50  # departs: more things than this nobody looks at; the best named are asked
+ROW_RATIO = 3.0  # departs: as long to wide as things must lie to be a row that people stand before
+ROW_ALONG = 0.95  # departs: cosine; rows stand along walls, what lies aslant is no row
+ROW_ASIDE_M = 0.3  # departs: a row through the room's middle has no side on which one stands
+HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before the bed
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One viewer: place (2,) and line of sight (2,) or None: to what is looked at. Metres, world frame."""
+
+    source: str  # "asker", "room centre", "one who faces window O4"
+    eye: F64
+    forward: F64 | None = None
+    trust: float = 1.0
+    z_m: float = 0.0  # where it stands
+    others: tuple[View, ...] = ()  # of several doors: from each room its own is meant
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of sight to m things: forward (m, 2) unit, eye (m, 2), whose, and how much they can be relied on (m,)."""
+
+    forward: F64
+    eye: F64
+    sources: tuple[str, ...]
+    trust: F64
+
+    @property
+    def left(self) -> F64:
+        """(m, 2) unit vectors to the left."""
+        return np.stack((-self.forward[:, 1], self.forward[:, 0]), axis=1)
+
+
+class Views:
+    """The view of a request on one map, in the order of preference: said, the asker's, the thing's front, the room."""
+
+    def __init__(self, layout: Layout, asker_world: F64, heading_rad: float = np.nan) -> None:
+        """asker_world: (3,) metres, NaN when not given; heading_rad about z from +x, NaN when not given."""
+        self.layout = layout
+        self.said: View | None = None  # what the request says, once it is known
+        self.asker: View | None = None
+        if np.isfinite(asker_world).all():
+            heading = np.array([np.cos(heading_rad), np.sin(heading_rad)]) if np.isfinite(heading_rad) else None
+            self.asker = View("asker", asker_world[:2], heading)
+
+    @property
+    def named(self) -> View | None:
+        """The view that the request or the asker gives."""
+        return self.said or self.asker
+
+    def toward(self, anchors: Boxes) -> Lines:
+        """How each of the anchors is seen."""
+        middle = self.layout.room_center(anchors.room)
+        forward, eye = anchors.center[:, :2] - middle, middle
+        sources, trust = ["room centre"] * len(anchors), np.full(len(anchors), MIDDLE_TRUST)
+        view = self.named
+        if view is not None:
+            views = [self._of_room(view, int(room)) for room in anchors.room]
+            eye = np.array([one.eye for one in views]).reshape(-1, 2)
+            forward = anchors.center[:, :2] - eye
+            if view is self.said and view.forward is not None:
+                forward = np.tile(view.forward, (len(anchors), 1))
+            sources, trust = [one.source for one in views], np.array([one.trust for one in views], float)
+        else:
+            for j in range(len(anchors)):
+                if np.isfinite(anchors.front[j]).all():
+                    forward[j], trust[j] = -anchors.front[j], 1.0
+                    eye[j] = anchors.center[j, :2] + 2.0 * anchors.front[j]
+                    sources[j] = f"front of {anchors.labels[j]}"
+                else:
+                    forward[j] = self.square_on(anchors, j)
+        return Lines(_unit(forward), eye, tuple(sources), trust)
+
+    def over(self, targets: Boxes, hint: Boxes | None = None) -> View:
+        """How several things are seen at once, with a line of sight; hint: what they are told by."""
+        middle = targets.center[:, :2].mean(axis=0) if len(targets) else np.zeros(2)
+        view = self.named
+        rooms = targets.room.tolist()
+        room = max(set(rooms), key=rooms.count) if rooms else -1
+        if view is not None:
+            view = self._of_room(view, room)
+            forward = view.forward if view.forward is not None else _unit((middle - view.eye)[None])[0]
+            return View(view.source, view.eye, forward if forward.any() else np.array([0.0, 1.0]), view.trust)
+        if hint is not None and len(hint) and hint.ids[0]:
+            faced = self.facing(hint.take([0]))
+            return View(faced.source, faced.eye, faced.forward, HINT_TRUST)
+        eye = self.layout.room_center(np.array([room]))[0]
+        whole = Boxes(
+            ("them",), ("",), targets.low.min(axis=0, keepdims=True), targets.high.max(axis=0, keepdims=True),
+            np.zeros(1), np.full((1, 2), np.nan), np.array([room]),
+        ) if len(targets) else None  # fmt: skip
+        forward = self.square_on(whole, 0) if whole is not None else np.array([0.0, 1.0])
+        # in the middle of them: look along +y, so that left is -x as on a map
+        return View("room centre", eye, forward if forward.any() else np.array([0.0, 1.0]), MIDDLE_TRUST)
+
+    def square_on(self, things: Boxes, j: int) -> F64:
+        """(2,) the line of sight of one who stands before a thing in its room: square to it where it has a broad side.
+
+        Zero for what is in the very middle of the room.
+        """
+        center, room = things.center[j, :2], things.room[j]
+        way = center - self.layout.room_center(np.array([room]))[0]
+        length = float(np.linalg.norm(way))
+        size, yaw = things.size[j, :2], float(things.yaw[j])
+        axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+        directions = np.concatenate((axes, -axes))
+        long = np.array([size[0] >= size[1], size[1] > size[0]] * 2)
+        ratio = float(size.max() / size.min())
+        low, high = self.layout.room_low[room, :2], self.layout.room_high[room, :2]
+        half = np.abs(directions) @ (size / 2)
+        edge = np.where(directions > 0, high - center, low - center)
+        steps = np.where(np.abs(directions) > 0.3, edge / np.where(np.abs(directions) > 0.3, directions, 1), np.inf)
+        free = steps.min(axis=1) - half
+        is_long_faced = things.labels[j].rsplit(" ", 1)[0] in LONG_FACED
+        broad = (long if is_long_faced else ~long) * (ratio >= (LONG_ENOUGH if is_long_faced else ELONGATED))
+        if not broad.any() and (free > WALL_M).all():
+            return way / length if length > 0.05 else np.zeros(2)
+        score = directions @ (way / length) if length > 0.05 else np.zeros(4)
+        score = score + 1.0 * (free <= WALL_M) + 1.0 * broad
+        return np.asarray(directions[int(np.argmax(score))])
+
+    def facing(self, things: Boxes) -> View:
+        """The view of one who looks at the first of some things, square on."""
+        front = things.front[0]
+        forward = -front / np.linalg.norm(front) if np.isfinite(front).all() else self.square_on(things, 0)
+        center = things.center[0, :2]
+        room = self.layout.room_center(things.room[:1])[0]
+        away = max(float((center - room) @ forward), float(np.abs(forward) @ things.size[0, :2]) / 2 + 1.0)
+        return View(f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None)
+
+    def facing_most(self, things: Boxes) -> View:
+        """The view of one who looks at several things: towards the wall that most of them are on ("the windows")."""
+        row = self._row(things)
+        if row is not None:
+            return row
+        ways = [self.facing(things.take([j])) for j in range(min(len(things), MAX_FACED))]
+        sights = np.array([np.zeros(2) if way.forward is None else way.forward for way in ways])
+        return ways[int(np.argmax((sights @ sights.T > SAME_WAY).sum(axis=1)))]
+
+    def _row(self, things: Boxes) -> View | None:
+        """The view of one who has a row of things of one room before him, across it; None where they are none."""
+        if len(things) < 2 or len(set(things.room.tolist())) > 1:
+            return None
+        centers = things.center[:, :2]
+        spread, axes = np.linalg.eigh(np.cov(centers.T))
+        if np.sqrt(spread[1]) < ROW_RATIO * np.sqrt(max(spread[0], 0.0)) or spread[1] < 1e-6:
+            return None
+        middle, room = centers.mean(axis=0), self.layout.room_center(things.room[:1])[0]
+        across = float((middle - room) @ axes[:, 0])
+        if abs(across) < ROW_ASIDE_M or np.abs(axes[:, 0]).max() < ROW_ALONG:
+            return None
+        forward = np.round(axes[:, 0]) * np.sign(across)
+        across = float((middle - room) @ forward)
+        return View(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
+
+    def away(self, things: Boxes) -> View:
+        """The view of one who has the first of some things behind."""
+        forward = -self.square_on(things, 0)
+        return View(f"{things.labels[0]} in the back", things.center[0, :2], forward if forward.any() else None)
+
+    def at(self, things: Boxes) -> View:
+        """The view of one who stands at a thing and looks to what is asked for; of several, at that of the room."""
+        views = [View(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))]
+        return View(views[0].source, views[0].eye, others=tuple(views))
+
+    def _of_room(self, view: View, room: int) -> View:
+        """Of the places that one may stand at the one of a room; of a view that is not from a place itself.
+
+        Where none of them is at the room (not every doorway has a door) the asker's view, or a doubtful one.
+        """
+        if not view.others:
+            return view
+        low, high = self.layout.room_low[room], self.layout.room_high[room]
+        places = np.array([[*one.eye, one.z_m] for one in view.others])
+        away = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0), axis=1)
+        nearest = view.others[int(np.argmin(away))]
+        if away.min() <= AT_ROOM_M:
+            return nearest
+        return self.asker or replace(nearest, trust=MIDDLE_TRUST)
+
+
+def _unit(vectors: F64) -> F64:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(np.where(length > 1e-3, vectors / np.maximum(length, 1e-9), 0.0))

@@ -1,0 +1,1 @@
+"""The local language model and the words that nodes share: prompts, grammars, word forms, synonyms."""

@@ -1,0 +1,300 @@
+"""The five-layer scene graph: a value with invariants and one canonical JSON form.
+
+Building -> floors -> rooms -> locations -> objects. Ids are a letter and a number (B0 F1 R4 L12 O57) and never reused.
+Edges between layers are the parent ids and nothing else. Inside a layer, what the building itself fixes is stored: the
+connections between rooms (C3: doors, openings, stairs), the ways of a robot between them, where it can stand before an
+object (place_graph.py). Relations between objects, which depend on who asks, are computed when asked for.
+Source: paper, section "Method" (G = (N, E), the boolean inter-layer edges). Departs: it has no place graph.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from placegraph.runtime.arrays import F64
+from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.scene_graph.place_graph import (
+    Approach,
+    Connection,
+    Way,
+    approach_from_dict,
+    approach_to_dict,
+    check_approach,
+    check_connection,
+    check_way,
+    connection_from_dict,
+    connection_key,
+    connection_to_dict,
+    rounded,
+    way_from_dict,
+    way_to_dict,
+)
+
+VERSION = 2  # 2: connections, ways and approaches
+LAYERS = {"B": "building", "F": "floor", "R": "room", "L": "location", "O": "object"}
+PARENT_LAYERS = {
+    "building": (),
+    "floor": ("building",),
+    "room": ("floor",),
+    "location": ("room",),
+    "object": ("room", "location"),
+}
+ID_PATTERN = re.compile(r"[BFRLO](0|[1-9][0-9]*)")
+
+
+@dataclass(frozen=True)
+class Tag:
+    """One name of a node and the weight of the evidence for it (summed votes for objects, probability for places)."""
+
+    name: str
+    weight: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Node:
+    """One building, floor, room, location or object. Box (2, 3) min/max and footprint (K, 2) in metres, world frame."""
+
+    id: str
+    parent: str  # "" for the building
+    tags: tuple[Tag, ...]  # strongest first
+    box: F64
+    footprint: F64
+    first_frame: int  # -1: not tied to frames
+    last_frame: int
+    observations: int = 0
+    oriented_box: tuple[float, ...] = ()  # objects: centre x y z, size x y z, yaw in rad about z
+    color: tuple[int, ...] = ()  # objects: sRGB median
+    approach: Approach | None = None  # objects: where to stand to face it; None where there is no such place
+    front: tuple[float, ...] = ()  # imported objects: x y of the direction that their front faces; () where unknown
+
+    @property
+    def layer(self) -> str:
+        """building, floor, room, location or object."""
+        return LAYERS[self.id[0]]
+
+    @property
+    def name(self) -> str:
+        """The strongest tag, or the layer's name when there is none."""
+        return self.tags[0].name if self.tags else self.layer
+
+    @property
+    def center(self) -> F64:
+        """Middle of the box, (3,) metres, world frame."""
+        return np.asarray(self.box.mean(axis=0))
+
+    @property
+    def turned_box(self) -> tuple[float, ...]:
+        """The oriented box; of a node without one its box, not turned, in the same seven numbers."""
+        return self.oriented_box or (*self.center.tolist(), *(self.box[1] - self.box[0]).tolist(), 0.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SceneGraph:
+    """Nodes and connections by id, and ways. Build it with `SceneGraph.of`, which checks the invariants."""
+
+    nodes: dict[str, Node] = field(default_factory=dict)
+    connections: dict[str, Connection] = field(default_factory=dict)
+    ways: tuple[Way, ...] = ()
+
+    @classmethod
+    def of(cls, nodes: Iterable[Node], connections: Iterable[Connection] = (), ways: Iterable[Way] = ()) -> SceneGraph:
+        """Make and check a graph; raises SchemaError naming what breaks an invariant."""
+        listed, joined = list(nodes), list(connections)
+        ids = [*(node.id for node in listed), *(connection.id for connection in joined)]
+        if len(set(ids)) != len(ids):
+            raise SchemaError(f"scene graph: id {Counter(ids).most_common(1)[0][0]} appears more than once")
+        graph = cls(
+            nodes={node.id: node for node in sorted(listed, key=lambda node: id_key(node.id))},
+            connections={one.id: one for one in sorted(joined, key=lambda one: connection_key(one.id))},
+            ways=tuple(sorted(ways, key=lambda way: (id_key(way.room), way.ends))),
+        )
+        graph.check()
+        return graph
+
+    def with_nodes(self, nodes: Iterable[Node]) -> SceneGraph:
+        """The same connections and ways with other nodes; raises SchemaError."""
+        return SceneGraph.of(nodes, self.connections.values(), self.ways)
+
+    def check(self) -> None:
+        """Check the invariants. Raises SchemaError naming what breaks one.
+
+        One building; each parent present and in an allowed layer; boxes ordered and finite; connections and ways of
+        rooms that exist, widths above 0, no length below the straight line.
+        """
+        buildings = [node.id for node in self.nodes.values() if node.layer == "building"]
+        if len(buildings) != 1:
+            raise SchemaError(f"scene graph: expected one building, found {len(buildings)}")
+        for node in self.nodes.values():
+            self._check_node(node)
+        rooms = frozenset(node.id for node in self.layer("room"))
+        for connection in self.connections.values():
+            check_connection(connection, rooms)
+        for way in self.ways:
+            check_way(way, self.connections, rooms)
+        for node in self.nodes.values():
+            if node.approach is not None:
+                check_approach(f"scene graph node {node.id}", node.approach, self.room_of(node.id), self.connections)
+
+    def _check_node(self, node: Node) -> None:
+        where = f"scene graph node {node.id}"
+        allowed = PARENT_LAYERS[node.layer]
+        if not allowed:
+            if node.parent:
+                raise SchemaError(f"{where}: a building has no parent, found {node.parent}")
+        elif node.parent not in self.nodes:
+            raise SchemaError(f"{where}: parent {node.parent or '(none)'} is not in the graph")
+        elif self.nodes[node.parent].layer not in allowed:
+            raise SchemaError(
+                f"{where}: a {node.layer} cannot hang from the {self.nodes[node.parent].layer} {node.parent}"
+            )
+        if node.box.shape != (2, 3) or not np.isfinite(node.box).all() or (node.box[0] > node.box[1]).any():
+            raise SchemaError(f"{where}: box must be (2, 3), finite, min <= max, found {node.box.tolist()}")
+        if node.footprint.ndim != 2 or node.footprint.shape[1] != 2 or not np.isfinite(node.footprint).all():
+            raise SchemaError(f"{where}: footprint must be (K, 2) and finite")
+        if node.oriented_box and (len(node.oriented_box) != 7 or not all(map(math.isfinite, node.oriented_box))):
+            raise SchemaError(f"{where}: oriented_box must be 7 finite numbers")
+        if node.front and (len(node.front) != 2 or not all(map(math.isfinite, node.front)) or not any(node.front)):
+            raise SchemaError(f"{where}: front must be 2 finite numbers, not both 0")
+
+    @cached_property
+    def _children(self) -> dict[str, tuple[str, ...]]:
+        found: dict[str, list[str]] = {}
+        for node in self.nodes.values():
+            found.setdefault(node.parent, []).append(node.id)
+        return {parent: tuple(ids) for parent, ids in found.items()}
+
+    @property
+    def building(self) -> Node:
+        """The root."""
+        return next(node for node in self.nodes.values() if node.layer == "building")
+
+    def layer(self, name: str) -> list[Node]:
+        """All nodes of a layer, by id number."""
+        return [node for node in self.nodes.values() if node.layer == name]
+
+    def children(self, node_id: str) -> list[Node]:
+        """Direct children, by layer and id number."""
+        return [self.nodes[i] for i in self._children.get(node_id, ())]
+
+    def descendants(self, node_id: str, layer: str) -> list[Node]:
+        """All nodes of `layer` below a node, by id number."""
+        found, tops = [], [node_id]
+        for top in tops:  # grows while it is walked
+            below = self.children(top)
+            tops += [node.id for node in below]
+            found += [node for node in below if node.layer == layer]
+        return sorted(found, key=lambda node: id_key(node.id))
+
+    def path(self, node_id: str) -> list[Node]:
+        """From the building down to the node itself."""
+        chain = [self.nodes[node_id]]
+        while chain[-1].parent:
+            chain.append(self.nodes[chain[-1].parent])
+        return chain[::-1]
+
+    def room_of(self, node_id: str) -> str:
+        """The id of the room that a node is, or is in; "" for a floor and the building."""
+        return next((node.id for node in self.path(node_id) if node.layer == "room"), "")
+
+    def to_json(self) -> str:
+        """Canonical JSON: sorted keys, lengths to 1 mm, weights to 4 decimals; equal graphs give equal bytes."""
+        document = {
+            "version": VERSION,
+            "nodes": [_node_to_dict(node) for node in self.nodes.values()],
+            "connections": [connection_to_dict(connection) for connection in self.connections.values()],
+            "ways": [way_to_dict(way) for way in self.ways],
+        }
+        return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+
+    @classmethod
+    def from_json(cls, text: str, where: str = "scene graph") -> SceneGraph:
+        """Read and check; raises SchemaError naming `where` and what is wrong."""
+        try:
+            data = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise SchemaError(f"{where}: not JSON: {error}") from None
+        if not isinstance(data, dict) or data.get("version") != VERSION:
+            found = data.get("version") if isinstance(data, dict) else type(data).__name__
+            raise SchemaError(f"{where}: expected graph version {VERSION}, found {found}")
+        for name in ("nodes", "connections", "ways"):
+            if not isinstance(data.get(name), list):
+                raise SchemaError(f"{where}: '{name}' must be a list")
+        return cls.of(
+            (_node_from_dict(entry, f"{where}: nodes[{i}]") for i, entry in enumerate(data["nodes"])),
+            [connection_from_dict(entry, f"{where}: connections[{i}]") for i, entry in enumerate(data["connections"])],
+            [way_from_dict(entry, f"{where}: ways[{i}]") for i, entry in enumerate(data["ways"])],
+        )
+
+    def save(self, path: Path) -> None:
+        """Write canonical JSON to a file."""
+        path.write_text(self.to_json() + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> SceneGraph:
+        """Read a file that `save` wrote; raises SchemaError."""
+        try:
+            return cls.from_json(path.read_text(encoding="utf-8"), str(path))
+        except (OSError, UnicodeDecodeError) as error:
+            raise SchemaError(f"{path}: cannot read the graph: {error}") from None
+
+
+def id_key(node_id: str) -> tuple[int, int]:
+    """Sort key: layer order from the building down, then number. Raises SchemaError for what is no id."""
+    if not isinstance(node_id, str) or not ID_PATTERN.fullmatch(node_id):
+        raise SchemaError(f"scene graph: {node_id!r} is not an id (a letter of B F R L O and a number)")
+    return list(LAYERS).index(node_id[0]), int(node_id[1:])
+
+
+def _node_to_dict(node: Node) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "id": node.id,
+        "layer": node.layer,
+        "parent": node.parent,
+        "tags": [[tag.name, rounded(tag.weight, 4)] for tag in node.tags],
+        "box": rounded(node.box, 3),
+        "footprint": rounded(node.footprint, 3),
+        "first_frame": node.first_frame,
+        "last_frame": node.last_frame,
+    }
+    if node.layer == "object":
+        entry |= {
+            "observations": node.observations,
+            "oriented_box": rounded(node.oriented_box, 3),
+            "color": list(node.color),
+            "approach": approach_to_dict(node.approach),
+        }
+        if node.front:
+            entry["front"] = rounded(node.front, 3)
+    return entry
+
+
+def _node_from_dict(entry: Any, where: str) -> Node:
+    try:
+        node_id = entry["id"]
+        id_key(node_id)
+        return Node(
+            id=node_id,
+            parent=str(entry["parent"]),
+            tags=tuple(Tag(str(name), float(weight)) for name, weight in entry["tags"]),
+            box=np.array(entry["box"], float).reshape(2, 3),
+            footprint=np.array(entry["footprint"], float).reshape(-1, 2),
+            first_frame=int(entry["first_frame"]),
+            last_frame=int(entry["last_frame"]),
+            observations=int(entry.get("observations", 0)),
+            oriented_box=tuple(float(v) for v in entry.get("oriented_box", ())),
+            color=tuple(int(v) for v in entry.get("color", ())),
+            approach=approach_from_dict(entry.get("approach")),
+            front=tuple(float(v) for v in entry.get("front", ())),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise SchemaError(f"{where}: {type(error).__name__}: {error}") from None

@@ -1,0 +1,223 @@
+"""Objects from elsewhere: a plain JSON list of named boxes, read without any image (README, "Other data").
+
+    {"objects": [{"id": 7, "tags": ["chair"], "center": [1, 2, 0.5], "size": [0.5, 0.5, 1],
+                  "color": "red", "front": [0, 1], "room": "r1"}],
+     "rooms": [{"id": "r1", "name": "kitchen", "floor": 0, "outline": [[0, 0], [4, 0], [4, 3]]}],
+     "floors": [{"id": 0, "name": "ground floor", "bottom": 0, "top": 2.6}]}
+
+Metres, z up. Only `objects` with `id`, `tags`, `center` and `size` are needed; fields of other names are not read.
+Ids are the lister's own, texts or whole numbers. `scene.py` makes the graph.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import reprlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, model_validator
+
+from placegraph.runtime.arrays import F64
+from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.scene_graph import Tag
+
+logger = logging.getLogger(__name__)
+
+OwnId = str | int  # as the lister calls it
+
+MAX_M = 1e6  # no building is larger, and no sum of squares overflows
+MAX_TEXT = 200  # characters of an id or a name
+LATER_NAME = 0.5  # weight of the names after the first, where a list gives none: other words for it, or less sure ones
+
+
+def _text(value: object, what: str) -> str:
+    if not isinstance(value, str) or not value.strip() or len(value) > MAX_TEXT:
+        raise ValueError(f"expected {what}: text that is not empty, at most {MAX_TEXT} characters")
+    if any("\ud800" <= character <= "\udfff" for character in value):  # JSON can spell them, UTF-8 cannot
+        raise ValueError(f"expected {what}; half of a surrogate pair is no character")
+    return value
+
+
+def _id(value: object) -> OwnId:
+    return value if type(value) is int else _text(value, "an id, text or a whole number")
+
+
+def _numbers(value: object, counts: Sequence[int], what: str, low: float = -MAX_M, high: float = MAX_M) -> list[float]:
+    numbers = value if isinstance(value, list) else []
+    if len(numbers) not in counts or not all(type(v) in (int, float) and low <= v <= high for v in numbers):
+        raise ValueError(f"expected {what}, each from {low:g} to {high:g}, got {reprlib.repr(value)}")
+    return [float(v) for v in numbers]
+
+
+def _tags(value: object) -> tuple[Tag, ...]:
+    what = "a list of names, strongest first, or of [name, weight]"
+    if not isinstance(value, list) or len({isinstance(entry, list) for entry in value}) > 1:
+        raise ValueError(f"expected {what}")
+    tags = []
+    for i, entry in enumerate(value):
+        name, weight = entry if isinstance(entry, list) and len(entry) == 2 else (entry, LATER_NAME if i else 1.0)
+        tags.append(Tag(_text(name, what).lower(), _numbers([weight], (1,), "weights", 0.0)[0]))
+    return tuple(sorted(tags, key=lambda tag: -tag.weight))
+
+
+def _color(value: object) -> tuple[int, ...] | str:
+    what = "an sRGB triple or a colour word"
+    if isinstance(value, str):
+        return _text(value, what).strip().lower().replace("grey", "gray")
+    numbers = _numbers(value, (3,), what, 0, 255)
+    if any(v % 1 for v in numbers) and max(numbers) <= 1:
+        raise ValueError("expected sRGB from 0 to 255, these look like 0 to 1")
+    return tuple(round(v) for v in numbers)
+
+
+def _front(value: object) -> tuple[float, float]:
+    x, y = _numbers(value, (2, 3), "a direction [x, y] or [x, y, z]")[:2]
+    length = math.hypot(x, y)
+    if length < 1e-6:
+        raise ValueError("expected a direction that is not upright and not zero")
+    return x / length, y / length
+
+
+def _outline(value: object) -> F64:
+    points = value if isinstance(value, list) else []
+    if len(points) < 3:
+        raise ValueError("expected 3 or more corners [x, y]")
+    return np.array([_numbers(point, (2,), "corners [x, y]") for point in points])
+
+
+def _center(value: object) -> list[float]:
+    return _numbers(value, (3,), "3 metres")
+
+
+def _size(value: object) -> list[float]:
+    return _numbers(value, (3,), "3 metres", 0.0)
+
+
+def _or_none(check: Callable[[object], Any]) -> PlainValidator:
+    return PlainValidator(lambda value: None if value is None else check(value))
+
+
+Id = Annotated[OwnId, PlainValidator(_id)]
+MaybeId = Annotated[OwnId | None, _or_none(_id)]
+Name = Annotated[str | None, _or_none(lambda value: _text(value, "a name"))]
+Tags = Annotated[tuple[Tag, ...], PlainValidator(_tags)]
+Metres = Annotated[float | None, _or_none(lambda value: _numbers([value], (1,), "metres")[0])]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="allow", arbitrary_types_allowed=True)
+
+    id: Id
+
+
+class ListedObject(_Entry):
+    """One object: its box lies along the axes."""
+
+    tags: Tags
+    center: Annotated[list[float], PlainValidator(_center)]
+    size: Annotated[list[float], PlainValidator(_size)]
+    color: Annotated[tuple[int, ...] | str | None, _or_none(_color)] = None
+    front: Annotated[tuple[float, float] | None, _or_none(_front)] = None
+    room: MaybeId = None
+
+    @property
+    def names(self) -> tuple[Tag, ...]:
+        """Its tags; a colour word makes one more ("red chair"), which has the word but is never all of a noun."""
+        if not isinstance(self.color, str):
+            return self.tags
+        noun, weight = (self.tags[0].name, self.tags[0].weight) if self.tags else ("object", 1.0)
+        return (*self.tags, Tag(f"{self.color} {noun}", weight * LATER_NAME))
+
+
+class ListedRoom(_Entry):
+    """One room; where it is follows from its outline, else its box, else the objects in it."""
+
+    name: Name = None
+    tags: Tags = ()
+    floor: MaybeId = None
+    outline: Annotated[F64 | None, _or_none(_outline)] = None  # (N, 2)
+    center: Annotated[list[float] | None, _or_none(_center)] = None
+    size: Annotated[list[float] | None, _or_none(_size)] = None
+
+    @model_validator(mode="after")
+    def _has_both(self) -> ListedRoom:
+        if (self.center is None) != (self.size is None):
+            raise ValueError("expected center and size, or neither")
+        return self
+
+    @property
+    def names(self) -> tuple[Tag, ...]:
+        """Its name, then its tags."""
+        first = (Tag(self.name, max([1.0, *(tag.weight for tag in self.tags)])),) if self.name else ()
+        return first + tuple(tag for tag in self.tags if tag.name != self.name)
+
+
+class ListedFloor(_Entry):
+    """One storey; without a bottom it lies where its rooms are."""
+
+    name: Name = None
+    bottom: Metres = None
+    top: Metres = None
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> ListedFloor:
+        if self.bottom is not None and self.top is not None and self.top < self.bottom:
+            raise ValueError("expected a top that is not below the bottom")
+        return self
+
+
+class ObjectList(BaseModel):
+    """The whole file. Rooms or floors that are left out are those that objects and rooms name."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    objects: list[ListedObject]
+    rooms: list[ListedRoom] | None = None
+    floors: list[ListedFloor] | None = None
+
+
+def read_listed(data: object, where: str) -> ObjectList:
+    """Check a list's fields and that its ids are clear; raises SchemaError naming `where`, the index and the field."""
+    try:
+        listed = ObjectList.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        at = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
+        reason = first["msg"].removeprefix("Value error, ")
+        raise SchemaError(": ".join(part for part in (where, at, reason) if part)) from None
+    for layer in ("objects", "rooms", "floors"):
+        seen: dict[OwnId, int] = {}
+        for i, entry in enumerate(getattr(listed, layer) or ()):
+            if (first_at := seen.setdefault(entry.id, i)) != i:
+                raise SchemaError(f"{where}: {layer}[{i}].id: {entry.id!r} is also the id of {layer}[{first_at}]")
+    for layer, up in (("objects", "room"), ("rooms", "floor")):
+        places = getattr(listed, f"{up}s")
+        known = None if places is None else {entry.id for entry in places}
+        for i, entry in enumerate(getattr(listed, layer) or ()):
+            own = getattr(entry, up)
+            if known is not None and own is not None and own not in known:
+                raise SchemaError(f"{where}: {layer}[{i}].{up}: {own!r} is not the id of a {up}")
+    _tell_unread(listed, where)
+    return listed
+
+
+def _tell_unread(listed: ObjectList, where: str) -> None:
+    """A field with a slip in its name would go unnoticed."""
+    unread = set(listed.model_extra or ())
+    for layer in ("objects", "rooms", "floors"):
+        unread |= {f"{layer}.{name}" for entry in getattr(listed, layer) or () for name in entry.model_extra or ()}
+    if unread:
+        logger.warning("%s: fields that are not read: %s", where, ", ".join(sorted(unread)))
+
+
+def read_json(path: Path) -> Any:
+    """The value in a JSON file; raises SchemaError naming the file."""
+    try:
+        return json.loads(path.read_bytes().decode("utf-8-sig"))  # -sig: some editors write a mark first
+    except (OSError, ValueError, RecursionError) as error:
+        raise SchemaError(f"{path}: cannot read: {error}") from None

@@ -1,0 +1,1 @@
+"""Geometry and registration of views, shared by the nodes that estimate poses."""

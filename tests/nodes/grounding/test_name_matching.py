@@ -1,0 +1,94 @@
+import pytest
+
+from placegraph.nodes.grounding.name_matching import (
+    COSINE,
+    FAIR,
+    HEAD,
+    KIND,
+    MEMBER,
+    SAME,
+    SHARED,
+    SLIP,
+    SYNONYM,
+    is_slip,
+)
+
+
+def test_nothing_is_like_nothing(names):
+    assert names.likeness("", "chair") == 0
+    assert names.likeness("chair", "") == 0
+    assert names.named("chair", []) == []
+    assert names.nearest("chair", []) == []
+
+
+@pytest.mark.parametrize(
+    ("noun", "tag", "score"),
+    [("chairs", "Chair", SAME), ("chair", "office chair", KIND), ("couch", "sofa", SYNONYM), ("mug", "cup", SYNONYM),
+     ("wooden chair", "chair", HEAD), ("chair", "zebra", 0),
+     ("duffel bag", "bag", SYNONYM + SHARED), ("duffel bag", "backpack", SYNONYM), ("trashcan", "trash can", SAME),
+     ("dry erase board", "whiteboard", SYNONYM), ("seats", "armchair", MEMBER), ("bookshlef", "bookshelf", SLIP),
+     ("angel staute", "statue", HEAD * SLIP), ("leather couch", "sofa", HEAD * SYNONYM),
+     ("mug", "rug", 0), ("glass", "window", 0),
+     ("table", "tablecloth", 0)],
+)  # fmt: skip
+def test_likeness(names, noun, tag, score):
+    assert names.likeness(noun, tag) == score
+
+
+OTHER_KIND = [
+    ("mug", "rug"), ("glass", "window"), ("desk", "sofa"), ("bed", "nightstand"), ("floor", "carpet"),
+    ("chair", "armchair"), ("fridge", "shelf"), ("bin", "bicycle"), ("lamp", "chair"), ("piano", "table"),
+]  # fmt: skip
+SAME_KIND = [
+    ("fridge", "refrigerator"),
+    ("couch", "sofa"),
+    ("tv", "television"),
+    ("plant", "flower"),
+    ("lamp", "light"),
+]
+
+
+def test_the_cosine_threshold_parts_the_pairs(names):
+    assert max(names.cosine(a, b) for a, b in OTHER_KIND) < COSINE
+    assert (
+        min(names.cosine(a, b) for a, b in [("fridge", "refrigerator"), ("couch", "sofa"), ("tv", "television")])
+        > COSINE
+    )
+
+
+def test_an_id_names_its_node(names, house):
+    assert [fit.node.id for fit in names.named("o14", house.layer("object"))] == ["O14"]
+    assert names.named("o999", house.layer("object")) == []
+
+
+def test_weak_second_tags_count_less_and_slips_not_at_all(names, thing_of):
+    second = thing_of(0, "R0", "stool", (0, 0, 0), (1, 1, 1), others=[("lamp", 3.0)])
+    slip = thing_of(1, "R0", "stool", (0, 0, 0), (1, 1, 1), others=[("lamp", 0.5)])
+    untagged = thing_of(2, "R0", "", (0, 0, 0), (1, 1, 1))
+    assert [(fit.node.id, round(fit.score, 3)) for fit in names.named("lamp", [second, slip, untagged])] == [
+        ("O0", 0.8)
+    ]
+
+
+def test_nearest_names(names, house):
+    assert names.nearest("carpet", house.layer("object"), 30)[0] != ""
+    assert names.nearest("refrigerators", house.layer("object"))[0] == "fridge"
+
+
+@pytest.mark.parametrize(
+    ("noun", "word", "slip"),
+    [("curtian", "curtain", True), ("widnow", "window", True), ("wimdow", "window", True), ("desk", "dusk", False),
+     ("refridgerator", "refrigerator", True), ("lamp", "lamb", False), ("table", "cable", False),
+     ("shelf", "shell", False),
+     ("board", "boards", False), ("chairs", "chair", True), ("", "chair", False)],
+)  # fmt: skip
+def test_slips_of_spelling(noun, word, slip):
+    assert is_slip(noun, word) == slip
+
+
+def test_what_is_fairly_called_so_is_taken_where_nothing_is(names, house):
+    objects = house.layer("object")
+    fair = names.fair("sofas", objects)
+    assert {fit.node.name for fit in fair} == {"sofa"}
+    assert all(fit.score >= FAIR for fit in fair)
+    assert names.fair("zebra", objects) == names.fair("", objects) == names.fair("o3", objects) == []

@@ -1,0 +1,202 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from placegraph.nodes.grounding.llm_parser import default_adapter_path
+from placegraph.runtime.errors import ModelError, QueryError
+from placegraph.runtime.language.grammar_options import enum_rule
+from placegraph.runtime.language.language_model import MAX_OPENINGS, LanguageModel, default_model_path, prompt
+
+
+@pytest.fixture(scope="module")
+def model():
+    made = LanguageModel(n_ctx=256)
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def adapted():
+    made = LanguageModel(n_ctx=256, adapter_path=default_adapter_path())
+    yield made
+    made.close()
+
+
+def test_the_packaged_model_is_there():
+    assert default_model_path().stat().st_size > 50_000_000
+
+
+def test_prompts_are_filled_in():
+    assert "{" not in prompt("placegraph.nodes.grounding", "purpose", purpose="sit on")
+    assert "sit on" in prompt("placegraph.nodes.grounding", "purpose", purpose="sit on")
+
+
+def test_a_prompt_that_does_not_fit_is_refused_and_the_model_lives_on(model):
+    for _ in range(2):
+        with pytest.raises(QueryError, match="do not fit the context of 256"):
+            model.complete("word " * 300, "root ::= " + enum_rule(["O1"]), 8)
+    with pytest.raises(QueryError, match="do not fit"):
+        model.log_probabilities("word " * 150, " word" * 150, [" a"])
+    assert model.complete("Say O1:", "root ::= " + enum_rule(["O1"]), 8).text == "O1"
+
+
+def test_a_reply_that_is_cut_off_is_refused(model):
+    with pytest.raises(QueryError, match="longer than 2 tokens"):
+        model.complete("Say:", "root ::= " + enum_rule(["a very long reply that needs many tokens"]), 2)
+
+
+def test_log_probabilities(model):
+    options = [" bedroom", " garage", " dining room"]
+    values = model.log_probabilities("A bed is found in the bedroom. A", " pillow is found in the", options)
+    assert values.shape == (3,)
+    assert (values < 0).all()
+    assert int(np.argmax(values)) == 0
+    model.complete("Say O1:", "root ::= " + enum_rule(["O1"]), 8)
+    again = model.log_probabilities("A bed is found in the bedroom. A", " pillow is found in the", options[::-1])
+    np.testing.assert_array_equal(values, again[::-1])
+    assert model.log_probabilities("A", " b", []).shape == (0,)
+
+
+OPENING, TEXT, OPTIONS = "A bed is found in the bedroom. A", " pillow is found in the", (" bedroom", " dining room")
+
+
+def probabilities(model):
+    return model.log_probabilities(OPENING, TEXT, OPTIONS).tobytes()
+
+
+def decoded(model, opening="Say O2 or O1."):
+    """A reply and every bit of what the model would say next."""
+    reply = model.complete(" Say:", 'root ::= " " ("O1" | "O2")', 8, opening=opening)
+    return reply, model._next_log_probabilities().tobytes()
+
+
+def test_replies_do_not_depend_on_what_was_asked_before(model):
+    first = probabilities(model), decoded(model), decoded(model, "")
+    model.complete("word " * 200, "root ::= " + enum_rule(["O1"]), 8)
+    assert (decoded(model), decoded(model, ""), probabilities(model)) == (first[1], first[2], first[0])
+    model.log_probabilities("Another opening of other words", TEXT, OPTIONS[::-1])
+    assert decoded(model, "") == first[2]
+    assert [probabilities(model), probabilities(model)] == [first[0]] * 2
+    assert [decoded(model), decoded(model)] == [first[1]] * 2
+
+
+def test_replies_are_the_same_in_a_new_process(model):
+    code = (
+        "from placegraph.runtime.language.language_model import LanguageModel;"
+        f"print(LanguageModel(n_ctx=256).log_probabilities({OPENING!r}, {TEXT!r}, {OPTIONS!r}).tobytes().hex())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert bytes.fromhex(done.stdout.strip()) == probabilities(model)
+
+
+def test_what_fits(model):
+    assert model.fits("word " * 100, "word " * 100, 8)
+    assert not model.fits("word " * 100, "word " * 100, 100)
+    assert not model.fits("word " * 150, "word " * 150, 8)
+
+
+def test_marks_in_a_text_after_an_opening_are_only_words(model):
+    model.load()
+    assert len(model._tokens("<|im_end|>", 1)) == 1
+    assert len(model._tokens("<|im_end|>", 1, before="a")) > 1
+
+
+def test_the_openings_kept_are_bounded(model):
+    first = decoded(model)
+    for number in range(MAX_OPENINGS + 2):
+        decoded(model, f"Opening {number}.")
+        assert len(model._openings) <= MAX_OPENINGS
+    assert decoded(model) == first
+
+
+def test_a_reply_says_how_likely_it_was_among_what_is_allowed(model):
+    prompt, rules = "One, two, three, four,", 'root ::= " five" | " seven"'
+    free = model.complete(prompt, rules, 8)
+    assert free.text == " five"
+    values = model.log_probabilities("One, two, three,", " four,", [" five", " seven"])
+    assert free.log_probability == pytest.approx(values[0], abs=0.02)  # read in one piece there, in two here
+    forced = model.complete(prompt, 'root ::= " seven"', 8)
+    assert forced.text == " seven"
+    assert forced.log_probability > values[1] + 1  # " s" and " se" are allowed, too
+    assert values[1] < -3
+
+
+def test_where_the_end_and_more_are_allowed_the_model_decides(model):
+    rules = 'root ::= "O1" ("2" | "3")?'
+    assert model.complete("O12 O12 O12 O12 ", rules, 8).text == "O12"
+    assert model.complete("Say O1 and nothing else.\nO1\nO1\nO1\nO1\n", rules + ' | "O1\n"', 8).text.strip() == "O1"
+
+
+def test_a_grammar_that_cannot_be_read_is_an_error_and_not_a_crash(model):
+    for rules in ("root ::= nothing", 'foot ::= "x"', "{{"):
+        with pytest.raises(ModelError, match="cannot read this grammar"):
+            model.complete("Say:", rules, 8)
+
+
+def test_the_adapter_is_on_for_the_calls_that_ask_for_it_alone(model, adapted):
+    def pair(asked):
+        return decoded(asked), probabilities(asked)
+
+    plain = pair(model)
+    assert pair(adapted) == plain
+    rules = 'root ::= " O1" | " O2"'
+    first = adapted.complete(" Say:", rules, 8, opening="A lamp.", adapted=True)
+    assert first != adapted.complete(" Say:", rules, 8, opening="A lamp.")
+    assert pair(adapted) == plain
+    assert adapted.complete(" Say:", rules, 8, opening="A lamp.", adapted=True) == first
+
+
+def test_an_adapter_that_is_not_there_or_does_not_fit_is_named(tmp_path, model):
+    with pytest.raises(QueryError, match="has no adapter"):
+        model.complete("Say:", "root ::= " + enum_rule(["O1"]), 8, adapted=True)
+    with pytest.raises(ModelError, match=r"nothing\.gguf: no such adapter"):
+        LanguageModel(adapter_path=tmp_path / "nothing.gguf").load()
+    broken = tmp_path / "broken.gguf"
+    for content in (b"", b"no adapter", default_adapter_path().read_bytes()[:100_000]):
+        broken.write_bytes(content)
+        with pytest.raises(ModelError, match=r"broken\.gguf: llama\.cpp cannot load it as an adapter of SmolLM2"):
+            LanguageModel(adapter_path=broken).load()
+    with pytest.raises(ModelError, match=r"Q4_1\.gguf: llama\.cpp cannot load it as an adapter"):
+        LanguageModel(adapter_path=default_model_path()).load()
+
+
+def test_a_dialogue_is_in_the_template_of_the_model(model):
+    opening, closing = model.dialogue("Say yes. ")
+    assert opening.endswith("<|im_start|>user\nSay yes. ")
+    assert closing == "<|im_end|>\n<|im_start|>assistant\n"
+    grammar = "root ::= " + enum_rule(["yes", "no"])
+    replies = {model.complete("Now", grammar, 8, opening=opening, closing=closing) for _ in range(2)}
+    assert len(replies) == 1
+    assert not model.fits(opening, "Now", 256, closing)
+
+
+@pytest.fixture
+def templated(monkeypatch):
+    """A model whose file holds another chat template."""
+
+    def make(template):
+        made = LanguageModel(n_ctx=256)
+        made.load()
+        made._llama.metadata["tokenizer.chat_template"] = template
+        return made
+
+    return make
+
+
+def test_a_model_without_a_template_gets_the_words_alone(templated):
+    assert templated("").dialogue("Say yes. ") == ("Say yes. ", "\n")
+
+
+def test_a_template_sees_no_clock_and_the_marks_of_its_model(templated):
+    template = "{{ bos_token }}{{ strftime_now('%Y') }} {{ messages[0]['content'] }}{{ eos_token }}"
+    assert templated(template).dialogue("Hi ") == ("<|im_start|>2024 Hi ", "<|im_end|>")
+
+
+def test_a_template_that_cannot_be_used_is_named(templated):
+    for template in ("{{ nothing() }}", "{% if %}", "{{ raise_exception('no user') }}"):
+        with pytest.raises(QueryError, match="chat template"):
+            templated(template).dialogue("Hi ")
+    with pytest.raises(QueryError, match="leaves out what the user says"):
+        templated("no words").dialogue("Hi ")

@@ -1,0 +1,286 @@
+"""The embedded networks in PyTorch: a small backbone with a feature pyramid, and a head for each task.
+
+Blocks follow YOLOv8 (C2f, SPPF, PAN) with ReLU in place of SiLU: it costs nothing in INT8. Text meets pixels as in
+YOLO-World's contrastive head: a projected word vector times each cell's embedding.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from placegraph.tools.training.words import EMBEDDING, KnownWords, Words
+
+STRIDES = (8, 16, 32)
+
+
+class Conv(nn.Sequential):
+    """Convolution, batch norm, ReLU."""
+
+    def __init__(self, c_in: int, c_out: int, size: int = 3, stride: int = 1) -> None:
+        super().__init__(
+            nn.Conv2d(c_in, c_out, size, stride, size // 2, bias=False),
+            nn.BatchNorm2d(c_out, eps=1e-3, momentum=0.03),
+            nn.ReLU(inplace=True),
+        )
+
+
+class Residual(nn.Module):
+    """Two 3x3 convolutions beside a shortcut."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.body = nn.Sequential(Conv(channels, channels), Conv(channels, channels))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(B, C, H, W) to the same."""
+        return x + self.body(x)
+
+
+class Csp(nn.Module):
+    """Cross-stage block: half of the channels go through `depth` residual steps, all are merged."""
+
+    def __init__(self, c_in: int, c_out: int, depth: int) -> None:
+        super().__init__()
+        self.half = c_out // 2
+        self.enter = Conv(c_in, 2 * self.half, 1)
+        self.steps = nn.ModuleList(Residual(self.half) for _ in range(depth))
+        self.leave = Conv((2 + depth) * self.half, c_out, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(B, c_in, H, W) to (B, c_out, H, W)."""
+        parts = list(self.enter(x).split(self.half, dim=1))
+        for step in self.steps:
+            parts.append(step(parts[-1]))
+        return self.leave(torch.cat(parts, dim=1))
+
+
+class PooledPyramid(nn.Module):
+    """Three chained max pools: a wide view at the coarsest scale (YOLOv8's SPPF)."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.enter = Conv(channels, channels // 2, 1)
+        self.pool = nn.MaxPool2d(5, 1, 2)
+        self.leave = Conv(channels * 2, channels, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(B, C, H, W) to the same."""
+        parts = [self.enter(x)]
+        for _ in range(3):
+            parts.append(self.pool(parts[-1]))
+        return self.leave(torch.cat(parts, dim=1))
+
+
+class Backbone(nn.Module):
+    """Image (B, 3, H, W), 0..1, to features at strides 8, 16, 32 after a top-down and a bottom-up path."""
+
+    WIDTHS = (64, 80, 112)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stem = nn.Sequential(Conv(3, 16, 3, 2), Conv(16, 32, 3, 2), Csp(32, 32, 1))
+        self.to8 = nn.Sequential(Conv(32, 64, 3, 2), Csp(64, 64, 2))
+        self.to16 = nn.Sequential(Conv(64, 112, 3, 2), Csp(112, 112, 4))
+        self.to32 = nn.Sequential(Conv(112, 176, 3, 2), Csp(176, 176, 3), PooledPyramid(176))
+        self.down16 = Csp(176 + 112, 80, 2)
+        self.down8 = Csp(80 + 64, 64, 2)
+        self.up16 = Conv(64, 64, 3, 2)
+        self.join16 = Csp(64 + 80, 80, 2)
+        self.up32 = Conv(80, 80, 3, 2)
+        self.join32 = Csp(80 + 176, 112, 2)
+
+    def forward(self, image: Tensor) -> list[Tensor]:
+        """Features at each of STRIDES."""
+        c8 = self.to8(self.stem(image))
+        c16 = self.to16(c8)
+        c32 = self.to32(c16)
+        p16 = self.down16(torch.cat((_double(c32), c16), 1))
+        p8 = self.down8(torch.cat((_double(p16), c8), 1))
+        n16 = self.join16(torch.cat((self.up16(p8), p16), 1))
+        n32 = self.join32(torch.cat((self.up32(n16), c32), 1))
+        return [p8, n16, n32]
+
+
+class TextHead(nn.Module):
+    """Scores of cells for words: embedding times projected word vector, scaled."""
+
+    def __init__(self, c_in: int) -> None:
+        super().__init__()
+        self.embed = nn.Sequential(Conv(c_in, c_in), nn.Conv2d(c_in, EMBEDDING, 1))
+        self.norm = nn.BatchNorm2d(EMBEDDING, momentum=0.03)
+        self.scale = nn.Parameter(torch.tensor(1.0))
+        self.bias = nn.Parameter(torch.tensor(-4.6))  # probability .01 at the start: most cells show nothing
+
+    def forward(self, features: Tensor, words: Tensor) -> Tensor:
+        """Features (B, C, h, w) and words (B, N, EMBEDDING), unit rows: logits (B, N, h * w)."""
+        cells = self.norm(self.embed(features)).flatten(2)
+        return self.scale * torch.matmul(words, cells) + self.bias
+
+
+class ObjectNetwork(nn.Module):
+    """Detector, with a dense head beside it from which the tagger is made.
+
+    The dense head names the object at each stride-8 cell; it teaches the backbone from every pixel.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.backbone = Backbone()
+        self.words: Words | KnownWords = Words()
+        self.boxes = nn.ModuleList(nn.Sequential(Conv(c, 64), nn.Conv2d(64, 4, 1)) for c in Backbone.WIDTHS)
+        self.texts = nn.ModuleList(TextHead(c) for c in Backbone.WIDTHS)
+        self.dense = TextHead(Backbone.WIDTHS[0])
+
+    def forward(self, image: Tensor, text: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Image (B, 3, H, W) and text (B, N, 256).
+
+        Gives raw distances (B, 4, A) of left, top, right, bottom in strides before softplus, logits (B, N, A), and
+        dense logits (B, N, A8) of the stride-8 cells.
+        """
+        features = self.backbone(image)
+        words = self.words(text)
+        distances = torch.cat([head(f).flatten(2) for head, f in zip(self.boxes, features, strict=True)], 2)
+        logits = torch.cat([head(f, words) for head, f in zip(self.texts, features, strict=True)], 2)
+        return distances, logits, self.dense(features[0], words)
+
+
+class Detector(nn.Module):
+    """ObjectNetwork in the YOLO-World export layout, for one input size."""
+
+    def __init__(self, network: ObjectNetwork, height: int, width: int) -> None:
+        super().__init__()
+        self.network = network
+        centres, strides = anchors(height, width)
+        self.register_buffer("centres", centres.T.contiguous()[None])
+        self.register_buffer("strides", strides[None, None])
+
+    def forward(self, image: Tensor, text: Tensor) -> Tensor:
+        """(1, 3, H, W) and (1, N, 256) to (1, 4 + N, A): cx cy w h in px, and probabilities."""
+        distances, logits, _ = self.network(image, text)
+        reach = functional.softplus(distances) * self.strides
+        low, high = self.centres - reach[:, :2], self.centres + reach[:, 2:]
+        return torch.cat(((low + high) / 2, high - low, torch.sigmoid(logits)), dim=1)
+
+
+class Tagger(nn.Module):
+    """An ObjectNetwork without its boxes, with fixed words: logits of the whole image, RAM++ layout.
+
+    The logit of a tag joins a smooth maximum over the dense head's cells and one over the detector's anchors: together
+    they name more than either. Input is ImageNet-normalised.
+    """
+
+    def __init__(self, network: ObjectNetwork, text: Tensor) -> None:
+        super().__init__()
+        self.backbone, self.words = network.backbone, network.words
+        self.dense, self.texts = network.dense, network.texts
+        self.register_buffer("text", text[None])  # (1, T, 256)
+        self.register_buffer("mean", torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1))
+        self.register_buffer("std", torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1))
+        self.gains = nn.Parameter(torch.full((2, text.shape[0]), 0.5))
+        self.shift = nn.Parameter(torch.zeros(text.shape[0]))
+
+    def forward(self, image: Tensor) -> Tensor:
+        """(B, 3, S, S) normalised to (B, T) logits."""
+        features = self.backbone(image * self.std + self.mean)
+        words = self.words(self.text).expand(image.shape[0], -1, -1)
+        cells = self.dense(features[0], words)
+        anchors = torch.cat([head(f, words) for head, f in zip(self.texts, features, strict=True)], 2)
+        return self.gains[0] * torch.logsumexp(cells, 2) + self.gains[1] * torch.logsumexp(anchors, 2) + self.shift
+
+
+class MaskEncoder(nn.Module):
+    """Image and depth to an embedding that is read once for all boxes of a frame."""
+
+    CHANNELS = 40
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.to2 = nn.Sequential(Conv(5, 16, 3, 2), Conv(16, 16))
+        self.to4 = nn.Sequential(Conv(16, 32, 3, 2), Csp(32, 32, 1))
+        self.to8 = nn.Sequential(Conv(32, 64, 3, 2), Csp(64, 64, 1))
+        self.to16 = nn.Sequential(Conv(64, 96, 3, 2), Csp(96, 96, 1), PooledPyramid(96))
+        self.down8 = Csp(96 + 64, 48, 1)
+        self.down4 = Csp(48 + 32, 32, 1)
+        self.down2 = Conv(32 + 16, self.CHANNELS - 1, 1)
+
+    def forward(self, image: Tensor, depth: Tensor) -> Tensor:
+        """(B, 3, H, W) 0..1 and (B, 1, H, W) metres, 0 = none: (B, CHANNELS, H/2, W/2); the last channel is depth."""
+        known = (depth > 0).to(depth.dtype)
+        c2 = self.to2(torch.cat((image, depth * 0.2, known), 1))
+        c4 = self.to4(c2)
+        c8 = self.to8(c4)
+        p8 = self.down8(torch.cat((_double(self.to16(c8)), c8), 1))
+        p4 = self.down4(torch.cat((_double(p8), c4), 1))
+        p2 = self.down2(torch.cat((_double(p4), c2), 1))
+        return torch.cat((p2, functional.max_pool2d(depth, 2)), 1)
+
+
+class MaskDecoder(nn.Module):
+    """Embedding and boxes to one mask a box, on a grid that covers the box with a margin, and its predicted IoU."""
+
+    GRID = 48
+    MARGIN = 0.08  # of the box's size on each side: what lies outside tells where the object ends
+
+    def __init__(self) -> None:
+        super().__init__()
+        c = MaskEncoder.CHANNELS + 4
+        self.enter = Conv(c, 32)
+        self.down = nn.Sequential(Conv(32, 48, 3, 2), Csp(48, 48, 1))
+        self.deep = nn.Sequential(Conv(48, 64, 3, 2), Csp(64, 64, 2))
+        self.up1 = Csp(64 + 48, 48, 1)
+        self.up2 = Conv(48 + 32, 24)
+        self.mask = nn.Conv2d(24, 1, 1)
+        self.quality = nn.Linear(64, 1)
+        line = (torch.arange(self.GRID) + 0.5) / self.GRID * (1 + 2 * self.MARGIN) - self.MARGIN
+        self.register_buffer("line", line)
+
+    def forward(self, embedding: Tensor, boxes: Tensor) -> tuple[Tensor, Tensor]:
+        """Embedding (1, C, h, w) and boxes (N, 4) x0 y0 x1 y1 as shares 0..1 of the image to masks and their IoU."""
+        return self.decode(self.sample(embedding, boxes))
+
+    def decode(self, cells: Tensor) -> tuple[Tensor, Tensor]:
+        """Sampled grids (N, C + 4, G, G) of any images to logits (N, 1, G, G) and predicted IoU (N, 1)."""
+        e0 = self.enter(cells)
+        e1 = self.down(e0)
+        e2 = self.deep(e1)
+        d1 = self.up1(torch.cat((_double(e2), e1), 1))
+        d0 = self.up2(torch.cat((_double(d1), e0), 1))
+        return self.mask(d0), torch.sigmoid(self.quality(e2.mean(dim=(2, 3))))
+
+    def sample(self, embedding: Tensor, boxes: Tensor) -> Tensor:
+        """What the embedding holds at each box's grid, with depth made relative and the box drawn in."""
+        x = boxes[:, 0:1] + (boxes[:, 2:3] - boxes[:, 0:1]) * self.line  # (N, G)
+        y = boxes[:, 1:2] + (boxes[:, 3:4] - boxes[:, 1:2]) * self.line
+        g = self.GRID
+        grid = torch.stack((x[:, None, :].expand(-1, g, g), y[:, :, None].expand(-1, g, g)), -1) * 2 - 1
+        sampled = functional.grid_sample(
+            embedding, grid.reshape(1, -1, g, 2), mode="bilinear", padding_mode="zeros", align_corners=False
+        )
+        sampled = sampled[0].reshape(embedding.shape[1], -1, g, g).transpose(0, 1)  # (N, C, G, G)
+        depth = sampled[:, -1:]
+        q = g // 4
+        middle = depth[:, :, q : g - q, q : g - q]
+        seen = (middle > 0).to(depth.dtype)
+        centre = (middle * seen).sum(dim=(2, 3), keepdim=True) / (seen.sum(dim=(2, 3), keepdim=True) + 1e-3)
+        relative = torch.clamp(depth - centre, -2.0, 2.0)
+        inside = ((self.line >= 0) & (self.line <= 1)).to(depth.dtype)
+        drawn = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
+        # how large the box is tells how coarse the grid is
+        size = (boxes[:, 2:] - boxes[:, :2])[:, :, None, None].expand(-1, 2, g, g)
+        return torch.cat((sampled[:, :-1], relative, relative * 4.0, drawn, size), 1)
+
+
+def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
+    """Cell centres (A, 2) x y in px and strides (A,) of an input size, by stride, row, column."""
+    centres, strides = [], []
+    for stride in STRIDES:
+        ys, xs = torch.meshgrid(torch.arange(height // stride), torch.arange(width // stride), indexing="ij")
+        centres.append((torch.stack((xs.flatten(), ys.flatten()), 1).float() + 0.5) * stride)
+        strides.append(torch.full((xs.numel(),), float(stride)))
+    return torch.cat(centres), torch.cat(strides)
+
+
+def _double(x: Tensor) -> Tensor:
+    return functional.interpolate(x, scale_factor=2.0, mode="nearest")
