@@ -1,4 +1,4 @@
-"""Node `playback`: a source that gives recorded messages again, so that the nodes behind them can be rerun."""
+"""Node `playback`: a source that replays recorded messages, so that the nodes behind them can be run again."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class PlaybackConfig(NodeConfig):
 
     path: str  # the recording
     kinds: tuple[str, ...] = Field(default=("Pose", "Keyframe", "LastKeyframe"), strict=False)  # TOML has lists only
-    incomplete: bool = False  # True: of a recording that was cut, take what is there and end after its last keyframe
+    incomplete: bool = False  # True: a recording that was cut is played up to its last keyframe
 
 
 class Playback(Source):
-    """Gives the recorded messages of its kinds, exact and in recorded order."""
+    """Produces the recorded messages of its kinds, bit for bit and in recorded order."""
 
     config_type: ClassVar[type[NodeConfig]] = PlaybackConfig
     outputs: tuple[type[Message], ...] = (Pose, Keyframe, LastKeyframe)
@@ -39,7 +39,7 @@ class Playback(Source):
         self.outputs = tuple(known[name] for name in config.kinds)
 
     def is_lossless(self) -> bool:
-        """A recording can wait."""
+        """True: a recording can wait for slow nodes."""
         return True
 
     def messages(self) -> Iterator[Message]:
@@ -52,8 +52,8 @@ class Playback(Source):
         counts = kinds_in(path)
         if Keyframe in self.outputs:
             _require_keyframes(path, counts)
-        ends = LastKeyframe in self.outputs and not counts.get("LastKeyframe", 0)
-        if ends and not self.config.incomplete:
+        end_is_missing = LastKeyframe in self.outputs and not counts.get("LastKeyframe", 0)
+        if end_is_missing and not self.config.incomplete:
             raise SourceError(
                 f"{path}: has no LastKeyframe: the recording was cut before its end. "
                 "Set `incomplete = true` in [nodes.playback] to end after its last keyframe"
@@ -64,10 +64,10 @@ class Playback(Source):
                 keyframes += 1
                 last = LastKeyframe(frame_id=message.frame_id, stamp_ns=message.stamp_ns, keyframes=keyframes)
             yield message
-            if self.ending:  # told to stop early: what follows still gets its last keyframe
-                ends = LastKeyframe in self.outputs and not isinstance(message, LastKeyframe)
+            if self.ending:  # stopped early: the nodes behind still need a LastKeyframe
+                end_is_missing = LastKeyframe in self.outputs and not isinstance(message, LastKeyframe)
                 break
-        if ends:
+        if end_is_missing:
             yield last
 
 

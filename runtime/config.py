@@ -17,7 +17,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Health, Message, Question
 from placegraph.runtime.node import Context, Node, Source, build_node
 
-# Given by the shells themselves, not by a node: requests from outside, and every process's own report.
+# Published by the shells, not by a node: requests from outside, and each process's report on itself.
 PRODUCED_BY_SHELL: tuple[type[Message], ...] = (Health, Question)
 
 
@@ -33,7 +33,7 @@ class RunSettings(BaseModel):
         default=1, ge=1
     )  # for each library that has threads of its own; more than 1 can change the last bits
     model_dirs: list[str] = []  # folders with weights, relative to the dataflow file
-    # after this long a question is answered with an error
+    # a question that takes longer is answered with an error
     question_timeout_s: float = Field(default=30.0, gt=0, allow_inf_nan=False, le=threading.TIMEOUT_MAX)
     log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
 
@@ -49,7 +49,7 @@ class RunConfig(BaseModel):
 
 
 def read(path: Path) -> RunConfig:
-    """Read a dataflow file, by path or by the name of one that comes with placegraph; raises ConfigError."""
+    """Read a dataflow file, by its path or by the name of a packaged one; raises ConfigError."""
     if not path.exists():
         packaged = Path(str(resources.files("placegraph.configs"))) / path.name
         if path.parent.name not in ("", "configs") or not packaged.exists():
@@ -68,20 +68,20 @@ def read(path: Path) -> RunConfig:
 
 
 def packaged_names() -> list[str]:
-    """Dataflow files that come with placegraph."""
+    """Names of the dataflow files that come with placegraph."""
     return sorted(item.name for item in resources.files("placegraph.configs").iterdir() if item.name.endswith(".toml"))
 
 
 def _first_problem(error: ValidationError) -> str:
-    problems = error.errors()  # an unknown section first: a misspelt one is also said to be missing
-    first = next((one for one in problems if one["type"] == "extra_forbidden"), problems[0])
+    problems = error.errors()  # an unknown section first: a misspelt one is also reported as missing
+    first = next((problem for problem in problems if problem["type"] == "extra_forbidden"), problems[0])
     section, *keys = [str(part) for part in first["loc"]]
     return f"[{section}]{' ' if keys else ''}{'.'.join(keys)}: {first['msg']}"
 
 
 @dataclass(frozen=True)
 class Dataflow:
-    """Nodes in an order in which each comes after those that feed it, and who gives what to whom."""
+    """The nodes, each after those whose messages it takes, and which node produces and consumes which message."""
 
     config: RunConfig
     context: Context
@@ -89,21 +89,21 @@ class Dataflow:
 
     @property
     def source(self) -> Source:
-        """The one node that takes nothing."""
+        """The one node without inputs."""
         return next(node for node in self.nodes.values() if isinstance(node, Source))
 
     def producer(self, kind: type[Message]) -> str | None:
-        """Name of the node that gives a kind."""
+        """Name of the node that produces a kind; None when no node does."""
         return next((name for name, node in self.nodes.items() if kind in node.outputs), None)
 
     def consumers(self, kind: type[Message]) -> list[str]:
-        """Names of the nodes that take a kind, in order."""
+        """Names of the nodes that consume a kind, in the order of the dataflow."""
         return [name for name, node in self.nodes.items() if kind in node.inputs]
 
     def awaited_consumers(self, name: str) -> dict[str, list[str]]:
-        """For each kind a node gives: the takers it waits for."""
+        """For each kind that a node produces, by name: the consumers it waits for."""
         return {
-            kind.__name__: [t for t in self.consumers(kind) if kind not in self.nodes[t].feedback]
+            kind.__name__: [c for c in self.consumers(kind) if kind not in self.nodes[c].feedback]
             for kind in self.nodes[name].outputs
         }
 
@@ -121,10 +121,10 @@ def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
         raise ConfigError(f"expected one source (camera or playback), found {', '.join(sources) or 'none'}")
     source = nodes[sources[0]]
     assert isinstance(source, Source)
-    given = sorted({kind.__name__ for node in nodes.values() for kind in node.outputs})
-    context = base.model_copy(update={"lossless": source.is_lossless(), "given": tuple(given)})
+    produced = sorted({kind.__name__ for node in nodes.values() for kind in node.outputs})
+    context = base.model_copy(update={"lossless": source.is_lossless(), "produced_kinds": tuple(produced)})
     source.context = context
-    # once more, now that it is known what is given: some nodes take a kind only if another gives it
+    # built again with what is produced now known: some nodes consume a kind only if another node produces it
     nodes = {
         name: nodes[name] if name == sources[0] else build_node(name, settings, context)
         for name, settings in config.nodes.items()
@@ -136,10 +136,10 @@ def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
 
 def _order(nodes: dict[str, Node]) -> list[str]:
     feeds: dict[str, set[str]] = {name: set() for name in sorted(nodes)}
-    for name, node in nodes.items():
-        for kind in node.inputs:
-            if kind not in node.feedback:
-                feeds[name] |= {producer for producer, other in nodes.items() if kind in other.outputs}
+    for name, consumer in nodes.items():
+        for kind in consumer.inputs:
+            if kind not in consumer.feedback:
+                feeds[name] |= {producer for producer, node in nodes.items() if kind in node.outputs}
     try:
         return list(graphlib.TopologicalSorter(feeds).static_order())
     except graphlib.CycleError as error:
@@ -152,9 +152,9 @@ def _check_wiring(dataflow: Dataflow) -> None:
     for kind in {kind for node in dataflow.nodes.values() for kind in node.outputs}:
         producers = [name for name, node in dataflow.nodes.items() if kind in node.outputs]
         if len(producers) > 1:
-            raise ConfigError(f"{kind.__name__} is given by {' and '.join(producers)}: switch one of them off")
+            raise ConfigError(f"{kind.__name__} is produced by {' and '.join(producers)}: switch one of them off")
     for name, node in dataflow.nodes.items():
         for kind in node.inputs:
             needed = kind not in PRODUCED_BY_SHELL and kind not in node.feedback and kind not in node.optional
             if needed and dataflow.producer(kind) is None:
-                raise ConfigError(f"{name} takes {kind.__name__}, which nothing gives")
+                raise ConfigError(f"{name} needs {kind.__name__}, which no node produces")

@@ -1,4 +1,4 @@
-"""Counters and percentiles behind the Health message. Pure: the shell hands in every duration."""
+"""Counters and percentiles of the Health message. Reads no clock: the shell passes every duration."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from placegraph.runtime.messages import Health
 
-WINDOW = 4096  # durations kept for the percentiles of a whole run: enough for hours of keyframes, bounded for days
+MAX_DURATIONS = 4096  # kept for the percentiles: hours of keyframes, and bounded in a run of days
 
 
 class StepStats:
-    """What one node did: steps, durations, drops."""
+    """Steps of one node: how many, how long they took, how many messages were dropped before them."""
 
     def __init__(self, node: str) -> None:
         self.node = node
         self.steps = 0
         self.drops = 0
-        self._durations_ms: deque[float] = deque(maxlen=WINDOW)
+        self._durations_ms: deque[float] = deque(maxlen=MAX_DURATIONS)
         self._steps_at_last_report = 0
 
     def add_step(self, duration_s: float) -> None:
@@ -32,14 +32,14 @@ class StepStats:
 
     def report(self, elapsed_s: float, queue: int, memory_mb: float) -> Health:
         """The Health message for the `elapsed_s` seconds since the last report."""
-        done = self.steps - self._steps_at_last_report
+        new_steps = self.steps - self._steps_at_last_report
         self._steps_at_last_report = self.steps
         return Health(
             frame_id=-1,
             stamp_ns=0,
             node=self.node,
             steps=self.steps,
-            rate_hz=done / elapsed_s if elapsed_s > 0 else 0.0,
+            rate_hz=new_steps / elapsed_s if elapsed_s > 0 else 0.0,
             step_p50_ms=self.percentile_ms(50),
             step_p95_ms=self.percentile_ms(95),
             queue=queue,

@@ -1,4 +1,4 @@
-"""The whole dataflow in one thread, in a fixed order: for tests, data sets and debugging."""
+"""Run the whole dataflow in one thread, in a fixed order: for tests, data sets and debugging."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from placegraph.runtime.config import Dataflow
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.health import StepStats
 from placegraph.runtime.messages import Message
-from placegraph.runtime.node import Source
+from placegraph.runtime.node import Node, Source
 
-CASCADE_LIMIT = 1000  # messages that one message of the source may cause
+MAX_CASCADE = 1000  # messages that one message of the source may cause; far above any real dataflow's
 
 
 class Inline:
     """Runs a dataflow; `stats` holds each node's step times afterwards."""
 
     def __init__(self, dataflow: Dataflow, observe: Callable[[Message], None] = lambda message: None) -> None:
-        """`observe` is shown every message once, before its takers."""
+        """`observe` gets every message once, before its consumers."""
         self._dataflow, self._observe = dataflow, observe
         self.stats = {name: StepStats(name) for name in dataflow.nodes}
 
     def __enter__(self) -> Inline:
-        started = []
+        started: list[Node] = []
         try:
             for node in self._dataflow.nodes.values():
                 started.append(node)
@@ -40,7 +40,7 @@ class Inline:
             node.stop()
 
     def run(self) -> None:
-        """Feed everything the source gives through the nodes."""
+        """Pass everything that the source produces through the nodes."""
         source = self._dataflow.source
         name = next(name for name, node in self._dataflow.nodes.items() if node is source)
         began = time.monotonic()
@@ -51,19 +51,19 @@ class Inline:
 
     def feed(self, message: Message) -> None:
         """Deliver one message and all that follows from it, oldest first."""
-        waiting, delivered = deque([message]), 0
-        while waiting:
-            current = waiting.popleft()
+        queue, delivered = deque([message]), 0
+        while queue:
+            current = queue.popleft()
             current.check()
             self._observe(current)
             delivered += 1
-            if delivered > CASCADE_LIMIT:
-                kinds = sorted({type(m).__name__ for m in waiting} | {type(current).__name__})
-                raise ConfigError(f"one message caused more than {CASCADE_LIMIT} others, last {', '.join(kinds)}")
+            if delivered > MAX_CASCADE:
+                kinds = sorted({type(queued).__name__ for queued in queue} | {type(current).__name__})
+                raise ConfigError(f"one message caused more than {MAX_CASCADE} others, last {', '.join(kinds)}")
             for name in self._dataflow.consumers(type(current)):
                 node = self._dataflow.nodes[name]
                 if isinstance(node, Source):
                     continue
                 began = time.monotonic()
-                waiting.extend(node.step(current))
+                queue.extend(node.step(current))
                 self.stats[name].add_step(time.monotonic() - began)

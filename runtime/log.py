@@ -17,7 +17,7 @@ class _Format(logging.Formatter):
 
 
 class _Stderr(logging.StreamHandler[TextIO]):
-    """Writes to what standard error is at the time of writing: it may have been redirected since."""
+    """Writes to the current `sys.stderr`, which may have been replaced since the handler was made."""
 
     @property
     def stream(self) -> TextIO:  # type: ignore[override]
@@ -29,7 +29,7 @@ class _Stderr(logging.StreamHandler[TextIO]):
 
 
 def configure(node: str, level: str = "INFO") -> None:
-    """Log to stderr with the node's name; calling again replaces what was there."""
+    """Log to stderr with the node's name; a second call replaces the first."""
     handler = _Stderr()
     handler.setFormatter(_Format(node))
     logging.basicConfig(level=level, handlers=[handler], force=True)

@@ -26,21 +26,21 @@ class NodeConfig(BaseModel):
 
 
 class Node:
-    """One step of the dataflow: `takes` kinds, `gives` kinds, `step` from one to the other.
+    """One node of the dataflow: consumes messages of `inputs`, produces messages of `outputs`.
 
     `step` may change the node's own state and nothing else: no bus, file, clock, print or unseeded randomness.
     A module under `nodes/` exports its class as `NODE`; it is built with the node's settings and the run's `Context`.
     """
 
     config_type: ClassVar[type[NodeConfig]] = NodeConfig
-    inputs: tuple[type[Message], ...] = ()  # on the class; set in __init__ only where it depends on settings
+    inputs: tuple[type[Message], ...] = ()  # set on the class; in __init__ only where they depend on settings
     outputs: tuple[type[Message], ...] = ()
-    # Kinds taken from further down the dataflow. A giver does not wait for this node to take them, which is what keeps
-    # a cycle from blocking; without these edges the dataflow has no cycle (checked when it is built).
+    # Inputs that come from further down the dataflow. Their producer does not wait for this node, or the cycle would
+    # block; without these edges the dataflow has no cycle (checked when it is built).
     feedback: ClassVar[tuple[type[Message], ...]] = ()
-    optional: tuple[type[Message], ...] = ()  # kinds taken if some node gives them
-    restartable: ClassVar[bool] = False  # live: a crash loses nothing but the message in hand (no state to lose)
-    # (question kind, answer kind): served as a queryable.
+    optional: tuple[type[Message], ...] = ()  # inputs that no node needs to produce
+    restartable: ClassVar[bool] = False  # live: started again after a crash, as it has no state to lose
+    # (question kind, answer kind): served as a queryable
     serves: ClassVar[tuple[type[Message], type[Message]] | None] = None
 
     def __init__(self, config: Any, context: Context) -> None:
@@ -48,52 +48,52 @@ class Node:
         self.context = context
 
     def start(self) -> None:
-        """Load what is slow to load (models). Called once, in the node's own process, before the first `step`."""
+        """Load what is slow to load, such as models. Called once, in the node's process, before the first `step`."""
 
     def step(self, message: Message) -> Sequence[Message]:
-        """Take one message of `takes`; return messages of `gives` in the order they are to be published."""
+        """Consume one message of `inputs`; returns messages of `outputs` in the order to publish them."""
         raise NotImplementedError
 
     def stop(self) -> None:
-        """Release what `start` took; called once after the last `step`, also when a step failed."""
+        """Release what `start` acquired. Called once after the last `step`, also when a step failed."""
 
 
 class Source(Node):
-    """A node that takes nothing and gives messages by itself: a camera, or a recording."""
+    """A node without inputs that produces messages by itself: a camera, or a recording."""
 
-    ending: bool = False  # set by the shell: give what says the end and return
+    ending: bool = False  # set by the shell: produce the message that marks the end, and return
 
     def is_lossless(self) -> bool:
-        """Whether every message must arrive (data sets, recordings) or the newest wins (a live camera)."""
+        """Whether every message must arrive (data sets, recordings), or old ones may be dropped (a live camera)."""
         raise NotImplementedError
 
     def given_poses(self) -> dict[int, F64] | None:
-        """stamp_ns to (4, 4) world_from_camera that the data bring, for evaluation; None when they bring none."""
+        """The data set's own poses for evaluation: stamp_ns to world_from_camera (4, 4), metres; None without any."""
         return None
 
     def messages(self) -> Iterator[Message]:
-        """What it gives, ending with the message that says so."""
+        """All messages of the source; the last one marks the end."""
         raise NotImplementedError
 
     def step(self, message: Message) -> Sequence[Message]:
-        """A source takes nothing."""
+        """Never called: a source has no inputs."""
         raise NotImplementedError
 
 
 class Context(BaseModel):
-    """What a node may know of the run it is part of."""
+    """What a node may know of its run."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
-    lossless: bool = True  # replay: nothing may be dropped; live: the newest wins
+    lossless: bool = True  # replay: nothing may be dropped; live: old frames may be
     threads: int = 1  # for each library that has threads of its own
-    model_dirs: tuple[str, ...] = ()  # where weights are looked for, after the packaged ones
-    out_dir: str = ""  # the run's folder; only sinks write
-    given: tuple[str, ...] = ()  # names of the kinds that some node of the dataflow gives, for those with a choice
+    model_dirs: tuple[str, ...] = ()  # folders with weights, searched after the packaged ones
+    out_dir: str = ""  # the run's folder, for the recorder and crash files
+    produced_kinds: tuple[str, ...] = ()  # names of the message classes that some node of the dataflow publishes
 
 
 def plugin(package: str, name: str, export: str, what: str) -> Any:
-    """Import `<package>.<name>` and return its `export`; raises ConfigError naming the choices when there is none."""
+    """Import `<package>.<name>` and return its `export`; raises ConfigError listing the choices when it is unknown."""
     choices = available(package)
     if name not in choices:
         raise ConfigError(f"no {what} named {name!r}; there are: {', '.join(choices)}")
@@ -104,23 +104,23 @@ def plugin(package: str, name: str, export: str, what: str) -> Any:
             raise
         package_name = error.name.split(".")[0]
         extra = EXTRAS.get(package_name)
-        how = f"pip install 'placegraph[{extra}]'" if extra else "see the extras in README"
-        raise ConfigError(f"{what} {name!r} needs the package {package_name!r}: {how}") from error
-    found = getattr(module, export, None)
-    if found is None:
+        hint = f"pip install 'placegraph[{extra}]'" if extra else "see the extras in README"
+        raise ConfigError(f"{what} {name!r} needs the package {package_name!r}: {hint}") from error
+    exported = getattr(module, export, None)
+    if exported is None:
         raise ConfigError(f"{package}.{name} exports no {export}")
-    return found
+    return exported
 
 
 def available(package: str) -> list[str]:
-    """Names of the plug-in modules in a package folder (private ones left out), without importing them."""
+    """Names of the public modules in a package folder, without importing them."""
     spec = importlib.util.find_spec(package)
     paths: Iterable[str] = (spec.submodule_search_locations or ()) if spec else ()
     return sorted(module.name for module in pkgutil.iter_modules(paths) if not module.name.startswith("_"))
 
 
 def build_node(name: str, settings: dict[str, Any], context: Context) -> Node:
-    """Find a node by name and build it with checked settings; raises ConfigError `[nodes.<name>] key: what`."""
+    """Find a node by name and build it with checked settings; raises ConfigError naming the node and the key."""
     node_type: type[Node] = plugin(NODES, name, "NODE", "node")
     try:
         config = node_type.config_type.model_validate(settings)

@@ -1,7 +1,7 @@
 """One node in one OS process: receive, step, publish, report.
 
 Started by the launcher as `python -m placegraph.runtime.process` with one JSON line (`ProcessSpec`) on standard input.
-Standard input then stays open as a lifeline: when it ends the launcher is gone, and so is this process.
+Standard input then stays open: when it ends, the launcher is gone, and this process ends too.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from placegraph.runtime.query.query_server import QueryServer
 
 logger = logging.getLogger(__name__)
 
-POLL_S = 0.2
-KEPT_FOR_CRASH = 4  # messages written to the crash file: the failing one and what led to it
+POLL_S = 0.2  # how soon an abort is noticed; chosen by hand
+CRASH_MESSAGES = 4  # written to the crash file: the failing one and the ones before it
 
 
 class ProcessSpec(BaseModel):
-    """What a process is told on its first line of input."""
+    """What a process needs to run its node: the first line of its standard input."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -49,47 +49,47 @@ class ProcessSpec(BaseModel):
     settings: dict[str, Any]
     context: Context
     bus: BusConfig
-    consumers: dict[str, list[str]]  # kind given -> nodes to wait for
+    consumers: dict[str, list[str]]  # name of an output kind -> nodes whose receipts are waited for
     question_timeout_s: float
     log_level: str = "INFO"
 
 
-class Process:
+class NodeProcess:
     """The shell around one node."""
 
     def __init__(self, spec: ProcessSpec, node: Node) -> None:
         self.spec, self.node = spec, node
-        newest = {} if spec.context.lossless else {k: TOPICS[k].newest for k in node.inputs if TOPICS[k].newest}
-        self.inbox = Inbox(newest)
+        limits = {} if spec.context.lossless else {kind: TOPICS[kind].keep_newest for kind in node.inputs}
+        self.inbox = Inbox(limits)
         self.stats = StepStats(spec.node)
         self.started, self.aborting = threading.Event(), threading.Event()
         self._ended = threading.Event()
         self.windows: dict[type[Message], CreditWindow] = {}
-        self._puts: dict[type[Message], Any] = {}
+        self._publishers: dict[type[Message], Any] = {}
         self._sequences: dict[type[Message], int] = {}
         self._expected: dict[type[Message], int] = {}
         self._query_server = QueryServer(self._forward, spec.question_timeout_s)
-        self._recent: deque[Envelope] = deque(maxlen=KEPT_FOR_CRASH)
+        self._recent: deque[Envelope] = deque(maxlen=CRASH_MESSAGES)
 
     # --- wiring
 
     def connect(self, bus: Bus) -> None:
-        """Declare publishers, subscribers and the token that says this process is ready."""
-        self._receipt = bus.publisher("receipt", self.spec.node)
+        """Declare publishers, subscribers and the liveliness token that marks this process as ready."""
+        self._send_receipt = bus.publisher("receipt", self.spec.node)
         serves = self.node.serves
-        given = {*self.node.outputs, Health, *((serves[0],) if serves else ())}
-        for kind in sorted(given, key=lambda kind: kind.__name__):
+        outputs = {*self.node.outputs, Health, *((serves[0],) if serves else ())}
+        for kind in sorted(outputs, key=lambda kind: kind.__name__):
             topic = TOPICS[kind]
-            self._puts[kind] = bus.publisher("topic", topic.key)
-            waits = not topic.newest or self.spec.context.lossless
-            if topic.window and waits and (consumers := self.spec.consumers.get(kind.__name__)):
-                self.windows[kind] = CreditWindow(topic.window, consumers)
+            self._publishers[kind] = bus.publisher("topic", topic.key)
+            lossless = self.spec.context.lossless or not topic.keep_newest
+            if topic.credit and lossless and (consumers := self.spec.consumers.get(kind.__name__)):
+                self.windows[kind] = CreditWindow(topic.credit, consumers)
         bus.subscribe(self._on_control, "control")
         bus.subscribe(self._on_receipt, "receipt", "*")
         bus.watch_alive(self._on_alive)
         for kind in self.node.inputs:
             if serves and kind is serves[0]:
-                bus.serve(self._query_server.take, "ask")
+                bus.serve(self._query_server.receive, "ask")
             else:
                 bus.subscribe(self._subscriber(kind), "topic", TOPICS[kind].key)
         bus.declare_alive(self.spec.node)
@@ -117,27 +117,27 @@ class Process:
         self.inbox.put(Envelope(Question, number, encode(question)))
 
     def stop(self) -> None:
-        """Finish what has arrived, then end; a source ends as if there were no more to give."""
+        """Step what is in the inbox, then end; a source ends as if its data had ended."""
         if isinstance(self.node, Source):
             self.node.ending = True
         self.started.set()
         self.inbox.close()
 
     def abort(self) -> None:
-        """End after the step in hand; what has arrived is left."""
+        """End after the current step; what is in the inbox is lost."""
         self.aborting.set()
         self.stop()
 
-    # --- work
+    # --- stepping
 
     def run(self) -> None:
-        """Step until told to stop; raises what `step` raised after writing the crash file."""
+        """Step until stopped; an exception of `step` passes through after the crash file is written."""
         if isinstance(self.node, Source):
             self._run_source(self.node)
         while not self.inbox.drained and not self.aborting.is_set():
             envelope = self.inbox.get(POLL_S)
             if envelope is not None:
-                self._take(envelope)
+                self._handle(envelope)
 
     def _run_source(self, source: Source) -> None:
         self.started.wait()
@@ -148,34 +148,34 @@ class Process:
                 return
             began = time.monotonic()
 
-    def _take(self, envelope: Envelope) -> None:
+    def _handle(self, envelope: Envelope) -> None:
         self._recent.append(envelope)
-        asked = self.node.serves is not None and envelope.kind is self.node.serves[0]
-        if asked and not self._query_server.is_waiting(envelope.sequence):
+        is_question = self.node.serves is not None and envelope.kind is self.node.serves[0]
+        if is_question and not self._query_server.is_waiting(envelope.sequence):
             return
-        if not asked:
+        if not is_question:
             self._check_order(envelope)
         message = decode(envelope.kind, envelope.payload)
-        if asked:
+        if is_question:
             self._publish(message)
         began = time.monotonic()
         try:
-            given = self.node.step(message)
+            outputs = self.node.step(message)
         except Exception:
             self._write_crash(traceback.format_exc())
             raise
         self.stats.add_step(time.monotonic() - began)
-        for out in given:
-            self._publish(out)
-            if asked and isinstance(out, Answer):
-                self._query_server.answer(envelope.sequence, out.json)
-        if not asked and envelope.kind not in self.node.feedback:
-            self._receipt(msgpack.packb([envelope.kind.__name__, envelope.sequence]), b"")
+        for output in outputs:
+            self._publish(output)
+            if is_question and isinstance(output, Answer):
+                self._query_server.answer(envelope.sequence, output.json)
+        if not is_question and envelope.kind not in self.node.feedback:
+            self._send_receipt(msgpack.packb([envelope.kind.__name__, envelope.sequence]), b"")
 
     def _check_order(self, envelope: Envelope) -> None:
-        """Every kind that must not be lost has gapless numbers; a gap in a replay would give another graph."""
+        """Check that sequence numbers have no gap; a gap in a replay would give another graph."""
         lossless, kind = self.spec.context.lossless, envelope.kind
-        if kind is Health:  # every process gives it: its numbers run in parallel
+        if kind is Health:  # every process publishes it, each with numbers of its own
             return
         expected = self._expected.get(kind, 1 if lossless else envelope.sequence)
         self._expected[kind] = envelope.sequence + 1
@@ -184,11 +184,11 @@ class Process:
             raise PlacegraphError(
                 f"{lost} {kind.__name__} lost before number {envelope.sequence}: a replay must not lose any"
             )
-        if lost > 0 and not TOPICS[kind].newest:
+        if lost > 0 and not TOPICS[kind].keep_newest:
             logger.warning("%d %s lost before number %d", lost, kind.__name__, envelope.sequence)
 
     def _publish(self, message: Message) -> bool:
-        """Send when the takers have room; False when told to abort before they have."""
+        """Send as soon as the consumers have credit; False when aborted before."""
         kind = type(message)
         window = self.windows.get(kind)
         sequence: int | None
@@ -198,19 +198,19 @@ class Process:
             while (sequence := window.reserve(POLL_S)) is None:
                 if self.aborting.is_set():
                     return False
-        self._puts[kind](encode(message), sequence.to_bytes(8))
+        self._publishers[kind](encode(message), sequence.to_bytes(8))
         return True
 
     def _write_crash(self, trace: str) -> None:
         if not self.spec.context.out_dir:
             return
         path = Path(self.spec.context.out_dir) / "crash" / f"{self.spec.node}.rec"
-        envelopes = [[p.kind.__name__, p.payload] for p in self._recent]
+        envelopes = [[envelope.kind.__name__, envelope.payload] for envelope in self._recent]
         record = [self.spec.model_dump_json(), trace, envelopes]
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(msgpack.packb(record))
-        except OSError as error:  # a full disk may be what it died of: that error must not be hidden by this one
+        except OSError as error:  # not raised: the exception of the step must pass through
             logger.error("no whole crash file: %s", error)
 
     def report_health(self) -> None:
@@ -223,29 +223,29 @@ class Process:
         self._publish_health(time.monotonic() - last, memory.memory_info().rss / 1e6)
 
     def end(self) -> None:
-        """Let `report_health` give its last report and return, and let nobody wait for an answer."""
+        """Let `report_health` publish its last report and return; questions that wait get an error reply."""
         self._query_server.close(f"the {self.spec.node} node ended")
         self._ended.set()
 
     def _publish_health(self, elapsed_s: float, memory_mb: float) -> None:
         drops = self.inbox.drops
-        fresh = sum(drops.values()) - self.stats.drops
-        if fresh:
-            names = ", ".join(f"{count} {kind.__name__}" for kind, count in drops.items())
-            logger.warning("dropped for newer ones so far: %s", names)
-        self.stats.drops += fresh
+        new_drops = sum(drops.values()) - self.stats.drops
+        if new_drops:
+            counts = ", ".join(f"{count} {kind.__name__}" for kind, count in drops.items())
+            logger.warning("dropped for newer ones so far: %s", counts)
+        self.stats.drops += new_drops
         self._publish(self.stats.report(elapsed_s, len(self.inbox), memory_mb))
 
 
 def _die_with_launcher() -> None:
     while os.read(0, 4096):  # not sys.stdin: its lock, held here, would abort the interpreter's shutdown
         pass
-    os._exit(3)  # the launcher is gone: nobody is left to stop this process in order
+    os._exit(3)  # the launcher is gone and cannot stop this process in order any more
 
 
 def main() -> int:
-    """Run one node until told to stop; exit status 0 in order, 1 after an error (logged)."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the launcher stops us in order
+    """Run one node until stopped; exit status 0 in order, 1 after an error (logged)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the launcher stops it in order
     spec = ProcessSpec.model_validate_json(sys.stdin.buffer.readline())
     log.configure(spec.node, spec.log_level)
     threading.Thread(target=_die_with_launcher, daemon=True).start()
@@ -255,7 +255,7 @@ def main() -> int:
         cv2.setNumThreads(spec.context.threads)
         node = build_node(spec.node, spec.settings, spec.context)
         node.start()
-        process = Process(spec, node)
+        process = NodeProcess(spec, node)
 
         def on_terminate(number: int, frame: FrameType | None) -> None:
             process.abort()

@@ -1,4 +1,4 @@
-"""Read and write recordings: Rerun .rrd files that hold every message exactly, beside what a person sees.
+"""Read and write recordings: Rerun .rrd files with every message bit for bit, beside the pictures for the viewer.
 
 Each kind has an entity `/messages/<Kind>` with one row a message: arrays flattened in their own dtype (a shape beside
 those of several axes), images as PNG, the rest as Arrow values, and the checksum of the declaration they were written
@@ -33,12 +33,12 @@ SEQUENCE, FRAME, CAPTURE_TIME = "sequence", "frame", "capture_time"
 CHECKSUM = "declaration_checksum"
 PROPERTIES = "placegraph"
 
-# departs: Rerun's 0.2 s writes five small chunks a second for each entity, 2.2 kB of headers each. Under load its timer
-# left chunks pending for seconds, so the writer also flushes by volume: that bounds what a killed process loses.
+# Not Rerun's default of 0.2 s: five small chunks a second for each entity, 2.2 kB of headers each. Under load its timer
+# left chunks pending for seconds, so the writer also flushes by volume, which bounds the loss of a killed process.
 FLUSH_S = 1.0
 CHUNK_BYTES = 1 << 20
 FLUSH_BYTES = 2 << 20
-FLUSH_TIMEOUT_S = 5.0  # without one a flush was seen to wait for ever when the disk filled up during it
+FLUSH_TIMEOUT_S = 5.0  # without a timeout a flush was seen to hang when the disk filled up
 # Ten 640x480 7-Scenes pairs, one thread: colour 15 ms, 369 kB (default strategy 17 ms, 417 kB; LZ4 1.3 ms, 772 kB),
 # depth 6.4 ms, 96 kB (LZ4 0.8 ms, 167 kB). Keyframes are few and disks small, so size wins.
 PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
@@ -47,10 +47,10 @@ M = TypeVar("M", bound=Message)
 
 
 class RecordingWriter:
-    """Writes messages into one Rerun stream: a file, a viewer's server on this machine, or both.
+    """Writes messages into one Rerun stream: a file, a server for viewers on this machine, or both.
 
-    `path` None: no file; `viewer_port` 0: no socket, else a viewer may connect on 127.0.0.1. `properties` say what
-    the run was. `blueprint` is how the viewer opens. Raises ConfigError when file or port cannot be had.
+    `path` None: no file; `viewer_port` 0: no server, else viewers may connect on 127.0.0.1. `properties` describe the
+    run. `blueprint` is the viewer's layout. Raises ConfigError when the file or the port is not available.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class RecordingWriter:
         self._newest = (0, 0)  # frame id and capture time
 
     def set_time(self, message: Message) -> None:
-        """Put what is logged next at the message's frame and capture time; at the newest seen if it has no frame."""
+        """Log what follows at the message's frame and capture time, or at the newest ones if it has no frame."""
         if message.frame_id >= 0:
             self._newest = max(self._newest, (message.frame_id, message.stamp_ns))
         frame_id, stamp_ns = (message.frame_id, message.stamp_ns) if message.frame_id >= 0 else self._newest
@@ -93,7 +93,7 @@ class RecordingWriter:
         self.stream.set_time(CAPTURE_TIME, timestamp=np.datetime64(stamp_ns, "ns"))
 
     def write(self, message: Message) -> dict[str, bytes]:
-        """Store every field bit for bit; returns the PNG of each image field, for whoever shows it.
+        """Store every field bit for bit; returns the PNG of each image field, for the viewer's pictures.
 
         Raises SchemaError for a field against its declaration or an empty image, ConfigError when the disk is full.
         """
@@ -120,18 +120,18 @@ class RecordingWriter:
             self._flush()
         entity = rr.DynamicArchetype(kind.__name__, components=columns)
         self.stream.log(f"{MESSAGES}/{kind.__name__}", entity, strict=True)
-        self.stream.reset_time()  # what a person sees carries no sequence: there would be one row for each
+        self.stream.reset_time()  # pictures carry no sequence number: the viewer would show a row for each
         self.set_time(message)
         return pngs
 
     def close(self) -> None:
-        """Write what is pending and the footer, let go of file and port; raises ConfigError unless `write` did."""
+        """Write what is pending and the footer, release file and port; raises ConfigError unless `write` did before."""
         try:
             if not self._failed:
                 self._flush()
         finally:
             if self._failed:
-                rr.unregister_shutdown()  # Rerun may wait for ever for a dead writer: the process shall not
+                rr.unregister_shutdown()  # Rerun may wait for ever for a dead writer, and the process with it
                 threading.Thread(target=self.stream.disconnect, daemon=True).start()
             else:
                 self.stream.disconnect()
@@ -181,14 +181,14 @@ def kinds_in(path: Path) -> dict[str, int]:
 
 
 def properties(path: Path) -> dict[str, str]:
-    """What the writer said of the run; raises as `read` does."""
-    found: dict[str, str] = {}
+    """The run's properties, as given to the writer; raises as `read` does."""
+    texts: dict[str, str] = {}
     for chunk in _chunks(path, _open(path).stream().filter(content=f"/__properties/{PROPERTIES}")):
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             if name != "rerun.controls.RowId":
-                found[name] = str(batch.column(name)[0].values[0].as_py())
-    return dict(sorted(found.items()))
+                texts[name] = str(batch.column(name)[0].values[0].as_py())
+    return dict(sorted(texts.items()))
 
 
 def _require_writable(path: Path) -> None:
@@ -259,16 +259,16 @@ def _chunks(path: Path, stream: LazyChunkStream) -> Iterator[Chunk]:
 
 
 def _rows(path: Path, reader: RrdReader, kind: type[M]) -> Iterator[tuple[int, M]]:
-    last = -1
+    previous = -1
     stream = reader.stream().filter(content=f"{MESSAGES}/{kind.__name__}", has_timeline=SEQUENCE)
     for chunk in _chunks(path, stream):
         batch = chunk.to_record_batch()
         columns = {name: batch.column(name) for name in batch.schema.names}
         for i, sequence in enumerate(columns[SEQUENCE].to_pylist()):
             where = f"{path}: {kind.__name__} number {sequence}"
-            if sequence <= last:
-                raise SchemaError(f"{where} comes after number {last}: the file was rewritten in another order")
-            last = sequence
+            if sequence <= previous:
+                raise SchemaError(f"{where} comes after number {previous}: the file was rewritten in another order")
+            previous = sequence
             yield sequence, _message(kind, columns, i, where)
 
 
@@ -279,10 +279,10 @@ def _message(kind: type[M], columns: dict[str, pa.Array], row: int, where: str) 
             raise SchemaError(f"{where}: the field {name} is missing")
         return column[row].values
 
-    written = values(CHECKSUM)[0].as_py()
-    if written != kind.checksum():
+    checksum = values(CHECKSUM)[0].as_py()
+    if checksum != kind.checksum():
         raise SchemaError(
-            f"{where}: recorded as declaration {written}, this version of placegraph knows {kind.checksum()}; "
+            f"{where}: recorded as declaration {checksum}, this version of placegraph knows {kind.checksum()}; "
             "recordings are remade, not migrated"
         )
     fields: dict[str, Any] = {}
@@ -293,8 +293,8 @@ def _message(kind: type[M], columns: dict[str, pa.Array], row: int, where: str) 
         else:
             fields[name] = flat.reshape(values(f"{name}.shape").to_pylist()) if len(spec.shape) > 1 else flat
     for name, hint in kind.scalar_types().items():
-        listed = values(name).to_pylist()
-        fields[name] = tuple(listed) if hint == tuple[str, ...] else listed[0]
+        items = values(name).to_pylist()
+        fields[name] = tuple(items) if hint == tuple[str, ...] else items[0]
     message = kind(**fields)
     message.check()
     return message

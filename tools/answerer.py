@@ -14,9 +14,9 @@ from typing import Any
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Answer, Graph, Question
 from placegraph.runtime.node import Context, Node, build_node
-from placegraph.runtime.query.reply import finished
-from placegraph.runtime.scene_graph.object_list import OwnId
-from placegraph.runtime.scene_graph.object_list_import import load_scene
+from placegraph.runtime.query.reply import answered
+from placegraph.runtime.scene_graph.object_list import SourceId
+from placegraph.runtime.scene_graph.object_list_import import import_graph
 from placegraph.tools.map_folder import RUN, find_graph, read_config
 
 KEPT = 4  # files whose graphs are kept: lines about one scene mostly follow each other
@@ -26,7 +26,7 @@ NODE_ID = re.compile(r"\b[FRO](?:0|[1-9][0-9]*)\b")
 @dataclass(frozen=True)
 class _Opened:
     graph: Graph
-    ids: dict[str, OwnId]
+    ids: dict[str, SourceId]
     settings: dict[str, Any]
     context: Context
 
@@ -64,10 +64,10 @@ class Answerer:
         ms = (time.monotonic() - began_s) * 1e3
         if not answers:
             raise QueryError("the grounding node gave no answer")
-        return in_own_ids(finished(json.loads(answers[0].json), ms), opened.ids)
+        return in_own_ids(answered(json.loads(answers[0].json), ms), opened.ids)
 
     def _read(self, path: Path) -> _Opened:
-        scene = load_scene(find_graph(path))
+        scene = import_graph(find_graph(path))
         settings: dict[str, Any] = {}
         context = Context()
         if path.is_dir() and (path / RUN).exists():  # ask the map the way its run would have answered
@@ -95,10 +95,10 @@ class Answerer:
             node.stop()
 
 
-def in_own_ids(reply: dict[str, Any], ids: dict[str, OwnId]) -> dict[str, Any]:
+def in_own_ids(reply: dict[str, Any], ids: dict[str, SourceId]) -> dict[str, Any]:
     """The same reply with the ids by which a file's maker knows things, in its sentences too."""
 
-    def own(node_id: str | None) -> OwnId | None:
+    def own(node_id: str | None) -> SourceId | None:
         return None if node_id is None else ids.get(node_id, node_id)
 
     def said(sentences: list[str]) -> list[str]:

@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.progress import track
 
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError, SchemaError
-from placegraph.runtime.query.reply import refusal
+from placegraph.runtime.query.reply import error_reply
 from placegraph.runtime.query.request import MAX_BYTES, make_question
-from placegraph.runtime.scene_graph.object_list import OwnId
+from placegraph.runtime.scene_graph.object_list import SourceId
 from placegraph.tools.answerer import Answerer
 
 logger = logging.getLogger(__name__)
@@ -58,18 +58,18 @@ class Batch:
 
     def answer(self, number: int, line: bytes) -> dict[str, Any]:
         """The answer to a line; an error tells its number. Raises ModelError and ConfigError: no line can be asked."""
-        question_id: OwnId | None = None
+        question_id: SourceId | None = None
         try:
             fields = _fields(line)
             question_id = _id(fields)
             reply = self._ask(fields)
         except (QueryError, SchemaError) as error:
-            reply = refusal(str(error))
+            reply = error_reply(str(error))
         except (ModelError, ConfigError):
             raise
         except Exception as error:  # a bug; the other lines are still to be answered
             logger.exception("line %d", number)
-            reply = refusal(f"{type(error).__name__}: {error}")
+            reply = error_reply(f"{type(error).__name__}: {error}")
         if reply["status"] == "error":
             reply["error"] = f"line {number}: {reply['error']}"
         return {"question_id": question_id} | {name: reply[name] for name in FIELDS}
@@ -105,7 +105,7 @@ def _fields(line: bytes) -> dict[str, Any]:
     return fields
 
 
-def _id(fields: dict[str, Any]) -> OwnId:
+def _id(fields: dict[str, Any]) -> SourceId:
     own = fields.get("id")
     if type(own) is int:
         return own

@@ -60,9 +60,9 @@ def topic_table() -> str:
     """Markdown table of the topics."""
     rows = ["| message | key | delivery | giver waits when ahead by | recorded |", "|---|---|---|---|---|"]
     for topic in TOPICS.values():
-        window = str(topic.window) if topic.window else "never waits"
+        credit = str(topic.credit) if topic.credit else "never waits"
         recorded = "yes" if topic.recorded else "no"
-        rows.append(f"| {topic.kind.__name__} | {topic.key} | {topic.delivery} | {window} | {recorded} |")
+        rows.append(f"| {topic.kind.__name__} | {topic.key} | {topic.delivery} | {credit} | {recorded} |")
     return "\n".join(rows)
 
 

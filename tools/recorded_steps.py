@@ -98,7 +98,7 @@ def differences(reference: Reference, name: str, **changed: Any) -> list[str]:
     `changed` settings replace the recorded ones. An error of ours is a difference; it ends the node's steps.
     """
     kinds = {type(reference.messages[taken]).__name__ for taken, _ in reference.steps[name]}
-    node = build_node(name, reference.settings[name] | changed, Context(given=tuple(sorted(kinds))))
+    node = build_node(name, reference.settings[name] | changed, Context(produced_kinds=tuple(sorted(kinds))))
     found: list[str] = []
     with language_model_replies(reference.replies, ask=False):
         try:

@@ -18,7 +18,7 @@ from placegraph.runtime.config import Dataflow, RunConfig, build, read
 from placegraph.runtime.errors import ConfigError, PlacegraphError
 from placegraph.runtime.health import StepStats
 from placegraph.runtime.inline import Inline
-from placegraph.runtime.launch import Launcher
+from placegraph.runtime.launcher import Launcher
 from placegraph.runtime.messages import Correction, End, Frame, Graph, Health, Keyframe, Map, Message, Pose
 from placegraph.tools.evaluate import against_given
 from placegraph.tools.map_folder import GRAPH, Collector, next_folder, prepare, write_run

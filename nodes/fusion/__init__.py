@@ -64,7 +64,7 @@ class FusionNode(Node):
 
     def __init__(self, config: FusionConfig, context: Context) -> None:
         super().__init__(config, context)
-        moves = Correction.__name__ in context.given
+        moves = Correction.__name__ in context.produced_kinds
         self.inputs = tuple(kind for kind in type(self).inputs if moves or kind is not Correction)
         self._synchronizer = FrameSynchronizer(*(kind for kind in self.inputs if kind is not LastKeyframe))
         self._submaps = Submaps(config.submap)

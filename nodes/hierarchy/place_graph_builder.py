@@ -23,7 +23,7 @@ from placegraph.nodes.hierarchy.stairs import Stairs, find_stairs, floors_stood_
 from placegraph.nodes.hierarchy.traversability import Ground, TravelConfig, deep_points, find_ground
 from placegraph.runtime.arrays import F64, I32, I64, U8, Bool, Points
 from placegraph.runtime.messages import Map
-from placegraph.runtime.scene_graph.place_graph import Approach, Connection, Way
+from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 
 PLACE_M = 0.5  # a connection is known again by a square of twice that around it
 STAIRS_ROOM_M = 1.0  # stairs end in the room that is so near, at most
@@ -55,7 +55,7 @@ class PlaceGraph:
     """Connections and ways of a map, and the approaches of its objects by id."""
 
     connections: list[Connection]
-    ways: list[Way]
+    ways: list[RouteSegment]
     approaches: dict[str, Approach]
 
 
@@ -97,7 +97,7 @@ class _Room:
     reach: Reach
     middle: tuple[int, int] | None
     reached: Bool
-    ways: dict[tuple[str, str], Way] = field(default_factory=dict)
+    ways: dict[tuple[str, str], RouteSegment] = field(default_factory=dict)
     stands: dict[str, tuple[Target, Stand | None]] = field(default_factory=dict)
 
 
@@ -123,7 +123,7 @@ class PlaceGraphBuilder:
         for portal, connection_id in zip(portals, self._identities.assign(places), strict=True):
             portal.id = connection_id
         portals.sort(key=lambda portal: int(portal.id[1:]))
-        ways: list[Way] = []
+        ways: list[RouteSegment] = []
         approaches: dict[str, Approach] = {}
         known, self._rooms = self._rooms, {}
         for floor in floors:
@@ -254,14 +254,14 @@ def _middle(free: Bool, ground: Ground) -> tuple[int, int] | None:
     return int(row), int(column)
 
 
-def _ways(room_id: str, ends: list[str], room: _Room) -> list[Way]:
+def _ways(room_id: str, ends: list[str], room: _Room) -> list[RouteSegment]:
     reach = room.reach
     for i in range(len(ends)):
         for j in range(i + 1, len(ends)):
             pair = (ends[i], ends[j])
             if pair not in room.ways and np.isfinite(reach.distance_m[i][reach.cells[j]]):
                 points = reach.way(i, reach.cells[j])
-                room.ways[pair] = Way(room=room_id, ends=pair, length_m=length_of(points), points=points)
+                room.ways[pair] = RouteSegment(room=room_id, ends=pair, length_m=length_of(points), points=points)
     return list(room.ways.values())
 
 

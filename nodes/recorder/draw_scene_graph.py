@@ -68,12 +68,12 @@ def draw_connections(picture: Picture, scene: SceneGraph) -> None:
         else:
             half = np.array([[one.width_m / 2, one.width_m / 2, 0.01]])
             drawn[f"world/connections/{one.id}"] = rr.Ellipsoids3D(centers=ends[:1], half_sizes=half, **look)
-    if scene.ways:
+    if scene.route_segments:
         strips = [
             np.column_stack(
-                (way.points, np.full(len(way.points), scene.nodes[way.room].box[0, 2] + CONNECTION_RAISE_M))
+                (segment.points, np.full(len(segment.points), scene.nodes[segment.room].box[0, 2] + CONNECTION_RAISE_M))
             )
-            for way in scene.ways
+            for segment in scene.route_segments
         ]
         drawn["world/ways"] = rr.LineStrips3D(strips, colors=[WAY_COLOR], radii=[0.006])
     picture.replace("connections", drawn)

@@ -1,7 +1,7 @@
 """The only file that imports zenoh: publish, subscribe, serve, ask, liveliness.
 
-One process (the launcher) is the hub, a Zenoh router on one endpoint; all others are its clients. Nothing but that
-endpoint listens, and multicast scouting is off unless the config turns it on.
+One process (the launcher) is the hub, a Zenoh router on one endpoint; all others are its clients. Only that endpoint
+listens, and multicast scouting is off unless the configuration turns it on.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from placegraph.runtime.errors import ConfigError, QueryError
 
-CONNECT_TIMEOUT_MS = 10_000
-PROBE_TIMEOUT_S = 1.0
+CONNECT_TIMEOUT_MS = 10_000  # chosen by hand: a hub that runs answers within milliseconds
+PROBE_TIMEOUT_S = 1.0  # chosen by hand
 
 
 class BusConfig(BaseModel):
@@ -27,35 +27,37 @@ class BusConfig(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
     endpoint: str = "tcp/127.0.0.1:7447"  # where the hub listens; another machine can reach it only if this says so
-    # first part of every key: give each robot its own; letters, digits and "._-", parts separated by "/"
+    # first part of every key, one for each robot; letters, digits and "._-", parts separated by "/"
     prefix: str = Field(default="placegraph", pattern=r"^[\w.-]+(/[\w.-]+)*$")
-    multicast: bool = False  # answer and send Zenoh's discovery on the local network
-    shared_memory: bool = False  # off: payloads in shared memory stay pinned when a taker is killed (FACTS 1)
+    multicast: bool = False  # whether Zenoh's discovery is sent and answered on the local network
+    shared_memory: bool = (
+        False  # off: payloads in shared memory stay pinned when a consumer is killed (seen, Zenoh 1.10)
+    )
 
     def key(self, *parts: str) -> str:
-        """A full key expression."""
+        """The parts behind the prefix, joined to a Zenoh key."""
         return "/".join((self.prefix, *parts))
 
 
-class Request:
-    """A query that waits for its one reply; further replies are ignored."""
+class IncomingQuery:
+    """A query from outside that waits for its one reply; further replies are ignored."""
 
     def __init__(self, query: Any) -> None:
         self._query = query
         self.payload: bytes = query.payload.to_bytes() if query.payload is not None else b""
 
     def reply(self, payload: bytes) -> None:
-        """Answer and let the asker go on."""
+        """Send the reply; the client's `ask` returns."""
         self._finish(lambda query: query.reply(query.key_expr, payload, encoding="application/json"))
 
     def fail(self, payload: bytes) -> None:
-        """Answer with an error."""
+        """Send an error; the client's `ask` returns it as its reply."""
         self._finish(lambda query: query.reply_err(payload, encoding="application/json"))
 
     def _finish(self, send: Callable[[Any], None]) -> None:
         query, self._query = self._query, None
         if query is not None:
-            with query:  # the asker waits as long as a reference to the query is alive
+            with query:  # the client waits as long as a reference to the query is alive
                 send(query)
 
 
@@ -63,7 +65,7 @@ class Bus:
     """A Zenoh session as hub or client. Use as a context manager: an unclosed session keeps its process alive."""
 
     def __init__(self, config: BusConfig, *, hub: bool = False) -> None:
-        """Open the session; raises ConfigError naming the endpoint when it cannot listen or nobody answers there."""
+        """Open the session; raises ConfigError naming the endpoint when it cannot listen or nothing answers there."""
         self.config = config
         settings = zenoh.Config()
         values: dict[str, Any] = {
@@ -82,9 +84,9 @@ class Bus:
                 _refuse_taken_port(config.endpoint)
             self._session = zenoh.open(settings)
         except zenoh.ZError as error:
-            doing = "listen on" if hub else "reach a running placegraph at"
-            raise ConfigError(f"[bus] endpoint: cannot {doing} {config.endpoint}: {error}") from None
-        self._declared: list[Any] = []
+            action = "listen on" if hub else "reach a running placegraph at"
+            raise ConfigError(f"[bus] endpoint: cannot {action} {config.endpoint}: {error}") from None
+        self._declarations: list[Any] = []  # Zenoh undeclares what is no longer referenced
 
     def publisher(self, *key: str) -> Callable[[bytes, bytes], None]:
         """Declare a publisher; returns put(payload, attachment), which blocks while the link is full."""
@@ -93,7 +95,7 @@ class Bus:
             congestion_control=zenoh.CongestionControl.BLOCK,
             reliability=zenoh.Reliability.RELIABLE,
         )
-        self._declared.append(publisher)
+        self._declarations.append(publisher)
 
         def put(payload: bytes, attachment: bytes) -> None:
             publisher.put(payload, attachment=attachment)
@@ -112,16 +114,16 @@ class Bus:
             on_sample(str(sample.key_expr), sample.payload.to_bytes(), attachment)
 
         handler: Any = zenoh.handlers.Callback(deliver, indirect=False)
-        self._declared.append(self._session.declare_subscriber(self.config.key(*key), handler))
+        self._declarations.append(self._session.declare_subscriber(self.config.key(*key), handler))
 
-    def serve(self, on_request: Callable[[Request], None], *key: str) -> None:
-        """Declare a queryable; on_request runs on Zenoh's thread, must return at once and see to a reply later."""
+    def serve(self, on_query: Callable[[IncomingQuery], None], *key: str) -> None:
+        """Declare a queryable; on_query runs on Zenoh's thread and must return at once, the reply may come later."""
 
         def deliver(query: Any) -> None:
-            on_request(Request(query))
+            on_query(IncomingQuery(query))
 
         handler: Any = zenoh.handlers.Callback(deliver, indirect=False)
-        self._declared.append(self._session.declare_queryable(self.config.key(*key), handler, complete=True))
+        self._declarations.append(self._session.declare_queryable(self.config.key(*key), handler, complete=True))
 
     def ask(self, payload: bytes, timeout_s: float, *key: str) -> bytes:
         """Send a request and wait for its reply; raises QueryError when there is none, or none in time."""
@@ -137,17 +139,17 @@ class Bus:
 
     def declare_alive(self, name: str) -> None:
         """Hold a liveliness token until the session closes."""
-        self._declared.append(self._session.liveliness().declare_token(self.config.key("alive", name)))
+        self._declarations.append(self._session.liveliness().declare_token(self.config.key("alive", name)))
 
     def watch_alive(self, on_change: Callable[[str, bool], None]) -> None:
-        """Call on_change(name, present) for every token, those that exist already included."""
+        """Call on_change(name, present) for every liveliness token, also for those that exist already."""
 
         def deliver(sample: Any) -> None:
             on_change(str(sample.key_expr).rsplit("/", 1)[-1], sample.kind == zenoh.SampleKind.PUT)
 
         handler: Any = zenoh.handlers.Callback(deliver, indirect=False)
         subscriber = self._session.liveliness().declare_subscriber(self.config.key("alive", "*"), handler, history=True)
-        self._declared.append(subscriber)
+        self._declarations.append(subscriber)
 
     def close(self) -> None:
         """Undeclare everything and close; harmless when called again."""
@@ -164,7 +166,7 @@ class Bus:
 
 
 def _refuse_taken_port(endpoint: str) -> None:
-    # Zenoh sets SO_REUSEPORT-like options on some systems: two hubs on one port would share its clients
+    # Zenoh sets options like SO_REUSEPORT on some systems, so two hubs on one port would share its clients.
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
     if protocol != "tcp" or not port.isdigit() or int(port) == 0:
@@ -173,7 +175,7 @@ def _refuse_taken_port(endpoint: str) -> None:
         probe.settimeout(PROBE_TIMEOUT_S)  # another machine's address may swallow packets
         try:
             taken = probe.connect_ex((host.strip("[]"), int(port))) == 0
-        except (OSError, OverflowError) as error:  # a name nobody knows, a port above 65535
+        except (OSError, OverflowError) as error:  # an unknown host, a port above 65535
             raise ConfigError(f"[bus] endpoint: cannot listen on {endpoint}: {error}") from None
     if taken:
         raise ConfigError(
@@ -182,7 +184,7 @@ def _refuse_taken_port(endpoint: str) -> None:
 
 
 def free_endpoint() -> str:
-    """A loopback TCP endpoint that was free a moment ago: for tests and runs that nobody else must find."""
+    """A loopback TCP endpoint that was free a moment ago, for tests and private runs."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

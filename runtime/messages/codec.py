@@ -1,4 +1,4 @@
-"""Messages to bytes and back: msgpack with arrays as raw buffers. What does not match its declaration is refused."""
+"""Pack messages into bytes and back: msgpack with arrays as raw buffers, checked against their declaration."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def encode(message: Message) -> bytes:
 
 
 def decode(kind: type[M], payload: bytes) -> M:
-    """Unpack and check; arrays are read-only views. Raises SchemaError, also for another version's bytes."""
+    """Unpack and check; arrays are read-only views. Raises SchemaError, also for bytes of another version."""
     try:
         name, checksum, scalars, arrays = msgpack.unpackb(payload)
     except (ValueError, TypeError, msgpack.UnpackException) as error:
@@ -35,7 +35,7 @@ def decode(kind: type[M], payload: bytes) -> M:
     if checksum != kind.checksum():
         raise SchemaError(
             f"{name}: the payload was declared as {checksum}, this process knows {kind.checksum()}: "
-            "giver and taker run different versions of placegraph"
+            "producer and consumer run different versions of placegraph"
         )
     fields: dict[str, Any] = {}
     try:

@@ -1,4 +1,4 @@
-"""Every message that travels between nodes; what a declaration means: runtime/messages/declaration.py."""
+"""All messages that travel between nodes; runtime/messages/declaration.py says what a declaration means."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from placegraph.runtime.messages.declaration import array as array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frame(Message):
-    """One aligned colour and depth pair, as the camera gave it."""
+    """One colour and depth image of the camera, aligned to each other."""
 
     color: U8 = array("uint8", ("H", "W", 3), unit="sRGB")
     depth: U16 = array("uint16", ("H", "W"), unit="depth_unit_m", frame="camera")  # 0 = no reading
@@ -28,19 +28,19 @@ class Frame(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class End(Message):
-    """The source gives no further frame; `frame_id` is that of the last one, -1 if there was none."""
+    """The source has no further frame; `frame_id` is that of the last one, -1 if there was none."""
 
     frames: int
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pose(Message):
-    """Where the camera was, and whether to believe it."""
+    """Where the camera was, and whether to trust that."""
 
     world_from_camera: F64 = array("float64", (4, 4), unit="m", frame="world")
     trusted: bool  # False: do not put this frame into the map
-    quality: float  # share of what was compared that agrees, 0..1: tracked corners, or by shape points on the map
-    residual_m: float  # by shape: median distance of those points to the map; NaN when nothing was compared
+    quality: float  # share 0..1 of the tracked corners that agree; of KISS-ICP the share of points near its map
+    residual_m: float  # of KISS-ICP: median distance of those points to its map; NaN when nothing was compared
     innovation_m: float  # how far registration moved the pose from its prediction
     reason: str  # why not trusted; "" when trusted
 
@@ -80,7 +80,7 @@ class LastKeyframe(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tags(Message):
-    """What the whole image shows, best first."""
+    """Names of what the whole image shows, best first."""
 
     names: tuple[str, ...]
     scores: F32 = array("float32", ("N",), unit="1")
@@ -122,16 +122,16 @@ class Segments(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Map(Message):
-    """All that fusion knows, complete each time: the world's cloud, free space, and the objects."""
+    """The whole map, complete each time: the point cloud of the world, free space, and the objects."""
 
     revision: int
-    final: bool  # the source ended and every keyframe is in
+    final: bool  # whether the source has ended and every keyframe is in
     keyframes: int
     voxel_m: float
     points_world: F32 = array("float32", ("P", 3), unit="m", frame="world")
     point_colors: U8 = array("uint8", ("P", 3), unit="sRGB")
     free_cell_m: float
-    free_points_world: F32 = array("float32", ("F", 3), unit="m", frame="world")  # centres of cells seen through
+    free_points_world: F32 = array("float32", ("F", 3), unit="m", frame="world")  # centres of cells seen to be free
     camera_positions_world: F32 = array("float32", ("K", 3), unit="m", frame="world")
     object_ids: I64 = array("int64", ("N",), unit="1")
     object_boxes_world: F32 = array("float32", ("N", 2, 3), unit="m", frame="world")  # min, max
@@ -145,10 +145,10 @@ class Map(Message):
     tag_names: tuple[str, ...]  # tags of object 0, then of object 1, ...; strongest first within an object
     tag_votes: F32 = array("float32", ("T",), unit="1")  # summed detection scores over views
     tag_offsets: I64 = array("int64", ("N+1",), unit="1")
-    retired_ids: I64 = array("int64", ("R",), unit="1")  # objects that were seen to be no longer there, ascending
+    retired_ids: I64 = array("int64", ("R",), unit="1")  # objects that are no longer where they were, ascending
     retired_boxes_world: F32 = array("float32", ("R", 2, 3), unit="m", frame="world")  # where they were
-    retired_last_frames: I64 = array("int64", ("R",), unit="1")  # that showed them
-    retired_gone_frames: I64 = array("int64", ("R",), unit="1")  # that made it certain
+    retired_last_frames: I64 = array("int64", ("R",), unit="1")  # the last frame that showed each
+    retired_gone_frames: I64 = array("int64", ("R",), unit="1")  # the frame after which it was certain
     retired_tag_names: tuple[str, ...]  # as tag_names
     retired_tag_votes: F32 = array("float32", ("U",), unit="1")
     retired_tag_offsets: I64 = array("int64", ("R+1",), unit="1")
@@ -156,7 +156,7 @@ class Map(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Graph(Message):
-    """The scene graph, complete each time, as its canonical JSON (see scene_graph.py)."""
+    """The scene graph, complete each time, as its canonical JSON (runtime/scene_graph/graph.py)."""
 
     revision: int  # that of the Map it was built from
     final: bool
@@ -177,14 +177,14 @@ class PlaceNames(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Question(Message):
-    """A request in plain words."""
+    """A question in plain words."""
 
     question_id: str
     text: str
     k: int  # how many candidates to list
-    mode: str  # one of question.MODES
-    viewpoint_world: F64 = array("float64", (3,), unit="m", frame="world")  # the asker's position; NaN: not given
-    heading_rad: float = math.nan  # where the asker looks, about z from +x; NaN: not given
+    mode: str  # one of runtime.query.request.MODES
+    viewpoint_world: F64 = array("float64", (3,), unit="m", frame="world")  # the asker's position; NaN: unknown
+    heading_rad: float = math.nan  # where the asker looks, about z from +x; NaN: unknown
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,7 +197,7 @@ class Answer(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Health(Message):
-    """How one process is doing, once a second."""
+    """Rate, step times, drops and memory of one process, once a second."""
 
     node: str
     steps: int

@@ -1,4 +1,4 @@
-"""Where a process that answers questions keeps its askers: queue with a limit, a time limit, one reply to each."""
+"""The server side of asking: questions that wait for their answer, at most MAX_WAITING, each with a time limit."""
 
 from __future__ import annotations
 
@@ -9,88 +9,95 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from placegraph.runtime.bus.session import Request
+from placegraph.runtime.bus.session import IncomingQuery
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
-from placegraph.runtime.query.reply import finished, refusal, to_bytes
-from placegraph.runtime.query.request import asked_id, parse_request
+from placegraph.runtime.query.reply import answered, encode_reply, error_reply
+from placegraph.runtime.query.request import parse_request, request_id
 
-MAX_WAITING = 16
+MAX_WAITING = 16  # chosen by hand: at a second an answer, the last one waits less than the time limit
 
 
 @dataclass(frozen=True)
-class _Asker:
-    request: Request
+class _PendingQuestion:
+    query: IncomingQuery
     question: Question
-    since_s: float  # monotonic
+    arrived_s: float  # monotonic
     timer: threading.Timer
 
-    def reply(self, make: Callable[[float], dict[str, Any]]) -> None:
-        """Send what `make` makes of the milliseconds since the request came."""
+    def answer(self, answer: dict[str, Any]) -> None:
         self.timer.cancel()
-        self.request.reply(to_bytes(make((time.monotonic() - self.since_s) * 1e3)))
+        self.query.reply(encode_reply(answered(answer, self._waited_ms())))
+
+    def refuse(self, reason: str) -> None:
+        self.timer.cancel()
+        reply = error_reply(reason, self.question.question_id, self.question.text, self._waited_ms())
+        self.query.reply(encode_reply(reply))
+
+    def _waited_ms(self) -> float:
+        return (time.monotonic() - self.arrived_s) * 1e3
 
 
 class QueryServer:
-    """Turns requests into Questions under a number of its own, which keeps two askers apart who chose the same id."""
+    """Turns queries into Questions. It numbers them, as two clients may choose the same question id."""
 
     def __init__(self, forward: Callable[[int, Question], None], timeout_s: float) -> None:
-        """`forward` takes a number and its question to the node; a reply is due within `timeout_s`."""
+        """`forward` passes a number and its question to the node; a reply is sent within `timeout_s`."""
         self._forward, self._timeout_s = forward, timeout_s
-        self._waiting: dict[int, _Asker] = {}
-        self._asked = 0
-        self._closed_because = ""
+        self._waiting: dict[int, _PendingQuestion] = {}
+        self._last_number = 0
+        self._closing_reason = ""
         self._lock = threading.Lock()
 
-    def take(self, request: Request) -> None:
-        """Forward a request, or reply at once why not; runs on the bus's thread."""
-        began_s = time.monotonic()
+    def receive(self, query: IncomingQuery) -> None:
+        """Forward a question to the node, or reply at once with the reason why not; runs on the bus's thread."""
+        arrived_s = time.monotonic()
         with self._lock:
-            self._asked += 1
-            number = self._asked
+            self._last_number += 1
+            number = self._last_number
         try:
-            question = parse_request(request.payload, f"Q{number}")
+            question = parse_request(query.payload, f"Q{number}")
         except QueryError as error:
-            ms = (time.monotonic() - began_s) * 1e3
-            request.reply(to_bytes(refusal(str(error), asked_id(request.payload), ms=ms)))
+            ms = (time.monotonic() - arrived_s) * 1e3
+            query.reply(encode_reply(error_reply(str(error), request_id(query.payload), ms=ms)))
             return
         timer = threading.Timer(self._timeout_s, self._refuse, (number, f"no answer within {self._timeout_s:g} s"))
         timer.daemon = True
-        asker = _Asker(request, question, began_s, timer)
+        pending = _PendingQuestion(query, question, arrived_s, timer)
         with self._lock:
-            reason = self._closed_because
+            reason = self._closing_reason
             if not reason and len(self._waiting) >= MAX_WAITING:
                 reason = f"busy: {MAX_WAITING} questions are waiting; ask again later"
             if not reason:
-                self._waiting[number] = asker
+                self._waiting[number] = pending
         if reason:
-            asker.reply(lambda ms: refusal(reason, question.question_id, question.text, ms))
+            pending.refuse(reason)
             return
         timer.start()
         self._forward(number, question)
 
     def answer(self, number: int, answer_json: str) -> None:
-        """Reply to one asker with the node's answer; nothing happens when the reply is already out."""
-        with self._lock:
-            asker = self._waiting.pop(number, None)
-        if asker is not None:
-            asker.reply(lambda ms: finished(json.loads(answer_json), ms))
+        """Reply to a question with the node's answer; does nothing when its time limit was reached before."""
+        if (pending := self._pop(number)) is not None:
+            pending.answer(json.loads(answer_json))
 
     def _refuse(self, number: int, reason: str) -> None:
+        if (pending := self._pop(number)) is not None:
+            pending.refuse(reason)
+
+    def _pop(self, number: int) -> _PendingQuestion | None:
         with self._lock:
-            asker = self._waiting.pop(number, None)
-        if asker is not None:
-            asker.reply(lambda ms: refusal(reason, asker.question.question_id, asker.question.text, ms))
+            return self._waiting.pop(number, None)
 
     def is_waiting(self, number: int) -> bool:
-        """Whether the asker of a question still waits; after the time limit nobody does, and a step would be wasted."""
+        """Whether a question still waits for its answer; after the time limit a step would be wasted."""
         with self._lock:
             return number in self._waiting
 
     def close(self, reason: str) -> None:
-        """Reply to everybody who still waits, and from now on to everybody who comes."""
+        """Reply with an error to all questions that wait, and to all that come later."""
         with self._lock:
-            self._closed_because = reason
+            self._closing_reason = reason
             numbers = list(self._waiting)
         for number in numbers:
             self._refuse(number, reason)

@@ -1,4 +1,4 @@
-"""What askers receive (README, "Asking"): every reply, also one that says why there is no answer, fits `Reply`."""
+"""The reply to a question (README, "Asking"). Every reply fits `Reply`, also one that says why there is no answer."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Point = Annotated[list[float], Field(min_length=3, max_length=3)]  # metres, wor
 Score = Annotated[float, Field(ge=0, le=1)]
 
 
-class _Part(BaseModel):
+class _ReplyPart(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
 
-class Step(_Part):
+class PathStep(_ReplyPart):
     """One node of the path from the building to the object."""
 
     id: str
@@ -23,8 +23,8 @@ class Step(_Part):
     name: str
 
 
-class RankedObject(_Part):
-    """One candidate with its score and the sentences that say why."""
+class RankedObject(_ReplyPart):
+    """One candidate with its score and the reasons for it, in sentences."""
 
     id: str
     name: str
@@ -32,22 +32,22 @@ class RankedObject(_Part):
     evidence: list[str]
 
 
-class Stand(_Part):
-    """Where to stand before the object."""
+class ApproachPose(_ReplyPart):
+    """Where a robot can stand to face the object, and its heading."""
 
     position: Point
     yaw_rad: float
 
 
-class View(_Part):
-    """Where left, right, front and behind were judged from."""
+class ReplyViewpoint(_ReplyPart):
+    """The viewpoint from which left, right, front and behind were judged."""
 
     source: str
     xyz: Point
     heading_rad: float | None = None
 
 
-class Reply(_Part):
+class Reply(_ReplyPart):
     """The fields of a reply, always all of them. `Reply.model_json_schema()` is its JSON Schema."""
 
     status: Literal["found", "not_in_map", "error"]
@@ -58,15 +58,15 @@ class Reply(_Part):
     name: str | None
     box: Annotated[list[Point], Field(min_length=2, max_length=2)] | None  # min and max
     center: Point | None
-    path: list[Step]
-    approach: Stand | None
+    path: list[PathStep]
+    approach: ApproachPose | None
     route: list[str]
     travel_m: Annotated[float, Field(ge=0)] | None
     evidence: list[str]
     candidates: list[RankedObject]
     parse: dict[str, Any] | str | None
     sure: bool
-    viewpoint: View | None
+    viewpoint: ReplyViewpoint | None
     revision: int  # of the graph that was asked; -1: there was none
     llm_calls: Annotated[int, Field(ge=0)]
     ms: Annotated[float, Field(ge=0)]  # from the request's arrival to its reply
@@ -76,25 +76,25 @@ class Reply(_Part):
         """Raises ValueError when the fields contradict each other."""
         found = self.status == "found"
         if {found} != {value is not None for value in (self.object_id, self.name, self.box, self.center)}:
-            raise ValueError("object_id, name, box and center are given just when status is found")
+            raise ValueError("object_id, name, box and center must be set if and only if status is found")
         if (self.status == "error") != bool(self.error):
-            raise ValueError("error says why just when status is error")
+            raise ValueError("error must be set if and only if status is error")
         if not found and (self.path or self.candidates or self.route or self.approach):
             raise ValueError("what was not found has no path, candidates, route or approach")
         if found and (self.path[-1:] != [step for step in self.path if step.id == self.object_id]):
             raise ValueError("the path ends at the object")
-        if found and self.object_id not in [one.id for one in self.candidates[:1]]:
+        if found and self.object_id not in [candidate.id for candidate in self.candidates[:1]]:
             raise ValueError("the object is the first candidate")
         return self
 
 
-def finished(answer: dict[str, Any], ms: float) -> dict[str, Any]:
-    """A node's answer as the reply to its asker: with the time it took, which no node knows. ms: since it was asked."""
+def answered(answer: dict[str, Any], ms: float) -> dict[str, Any]:
+    """The reply that carries a node's answer; `ms` since the question arrived, which no node knows."""
     return {"error": None} | answer | {"ms": round(ms, 1)}
 
 
-def refusal(reason: str, question_id: str = "", text: str = "", ms: float = 0.0) -> dict[str, Any]:
-    """The fields of a reply that no node was asked for."""
+def error_reply(reason: str, question_id: str = "", text: str = "", ms: float = 0.0) -> dict[str, Any]:
+    """The reply that says why there is no answer; `ms` since the question arrived."""
     return {
         "status": "error",
         "error": reason,
@@ -109,6 +109,6 @@ def refusal(reason: str, question_id: str = "", text: str = "", ms: float = 0.0)
     }
 
 
-def to_bytes(reply: dict[str, Any]) -> bytes:
-    """The JSON that is sent: UTF-8, sorted keys."""
+def encode_reply(reply: dict[str, Any]) -> bytes:
+    """A reply as it is sent: UTF-8 JSON with sorted keys."""
     return json.dumps(reply, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()

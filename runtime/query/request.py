@@ -1,4 +1,4 @@
-"""What askers send (README, "Asking"): one JSON object, checked against `Request`, to a Question message."""
+"""What clients send (README, "Asking"): one JSON object, checked against `QuestionRequest`, becomes a Question."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
 
 MAX_BYTES = 65_536  # of a request; more is refused unread
-MAX_TEXT = 500  # characters; longer is not a request but a document
+# all chosen by hand
+MAX_TEXT = 500  # characters; longer is not a question but a document
 MAX_ID = 100  # characters
 MAX_CANDIDATES = 50
 MAX_COORDINATE_M = 1e6  # no building is larger, and no sum of squares overflows
-Mode = Literal["program", "rules", "deductive"]  # a reading by the model, by phrase rules, or a call for each level
+# parsed by the language model, by phrase rules, or asked of the model level by level
+Mode = Literal["program", "rules", "deductive"]
 MODES: tuple[str, ...] = get_args(Mode)
 
 Number = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M, allow_inf_nan=False)]
 
 
-class Request(BaseModel):
-    """The fields of a request; each description says what is expected. `Request.model_json_schema()` is its schema."""
+class QuestionRequest(BaseModel):
+    """The fields of a request; each description says what is expected. `model_json_schema()` is its JSON Schema."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
@@ -42,11 +44,11 @@ class Request(BaseModel):
     mode: Mode = Field(default="program", description=f"one of {', '.join(MODES)}")
 
 
-FIELDS = tuple(Request.model_fields)
+REQUEST_FIELDS = tuple(QuestionRequest.model_fields)
 
 
 def parse_request(payload: bytes, fallback_id: str = "") -> Question:
-    """Read a request; raises QueryError naming the field that is wrong. A bare text that is no JSON is refused too."""
+    """Read a request; raises QueryError naming what is wrong. `fallback_id`: for a request without an id."""
     if len(payload) > MAX_BYTES:
         raise QueryError(f"the request has {len(payload)} bytes; at most {MAX_BYTES} are read")
     try:
@@ -57,30 +59,30 @@ def parse_request(payload: bytes, fallback_id: str = "") -> Question:
         raise QueryError('the request is not JSON; expected {"text": "..."}') from None
     if not isinstance(request, dict):
         raise QueryError(f'expected an object like {{"text": "..."}}, got {type(request).__name__}')
-    return question_of({"id": fallback_id} | request)
+    return to_question({"id": fallback_id} | request)
 
 
-def asked_id(payload: bytes) -> str:
-    """The id in a request, however wrong the rest of it; "" when there is none that could be sent back."""
+def request_id(payload: bytes) -> str:
+    """The id in a request whose other fields may be wrong; "" when there is none that could be sent back."""
     try:
         request = json.loads(payload) if len(payload) <= MAX_BYTES else None
-        return Request(text="-", id=request["id"]).id if isinstance(request, dict) and "id" in request else ""
+        return QuestionRequest(text="-", id=request["id"]).id if isinstance(request, dict) and "id" in request else ""
     except (ValueError, RecursionError):  # ValueError: not JSON, not UTF-8, or an id that breaks its rule
         return ""
 
 
 def make_question(text: Any, *, question_id: Any = "", k: Any = 5, mode: Any = "program", pose: Any = None) -> Question:
-    """Check every part of a question; raises QueryError naming the field. pose: as in `Request`."""
-    return question_of({"text": text, "id": question_id, "k": k, "mode": mode, "pose": pose})
+    """Make a Question; raises QueryError naming the field that is wrong. pose: as in `QuestionRequest`."""
+    return to_question({"text": text, "id": question_id, "k": k, "mode": mode, "pose": pose})
 
 
-def question_of(request: dict[str, Any]) -> Question:
+def to_question(request: dict[str, Any]) -> Question:
     """The Question of a request's fields; raises QueryError naming the field that is wrong."""
-    for field in sorted(set(request) - set(FIELDS)):
-        what = "it is called pose" if field == "viewpoint" else f"there are: {', '.join(sorted(FIELDS))}"
-        raise QueryError(f"unknown field {_shown(field)}; {what}")
+    for field in sorted(set(request) - set(REQUEST_FIELDS)):
+        hint = "it is called pose" if field == "viewpoint" else f"there are: {', '.join(sorted(REQUEST_FIELDS))}"
+        raise QueryError(f"unknown field {_shown(field)}; {hint}")
     try:
-        checked = Request.model_validate(request)
+        checked = QuestionRequest.model_validate(request)
     except ValidationError as error:
         raise QueryError(_reason(error)) from None
     pose = [*(checked.pose or ()), math.nan, math.nan, math.nan, math.nan]
@@ -100,7 +102,7 @@ def question_of(request: dict[str, Any]) -> Question:
 def _reason(error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
     field = str(first["loc"][0])
-    expected = f"{field}: expected {Request.model_fields[field].description}"
+    expected = f"{field}: expected {QuestionRequest.model_fields[field].description}"
     if first["type"] == "missing":
         return expected
     if first["type"] == "string_too_long":
@@ -111,5 +113,5 @@ def _reason(error: ValidationError) -> str:
 
 
 def _shown(value: object) -> str:
-    """The start of a value as it can be sent: half a surrogate pair, which UTF-8 cannot spell, as its number."""
+    """The start of a value, for messages; half a surrogate pair, which UTF-8 cannot encode, as its number."""
     return reprlib.repr(value).encode("utf-8", "backslashreplace").decode()

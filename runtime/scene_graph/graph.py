@@ -1,10 +1,10 @@
 """The five-layer scene graph: a value with invariants and one canonical JSON form.
 
 Building -> floors -> rooms -> locations -> objects. Ids are a letter and a number (B0 F1 R4 L12 O57) and never reused.
-Edges between layers are the parent ids and nothing else. Inside a layer, what the building itself fixes is stored: the
-connections between rooms (C3: doors, openings, stairs), the ways of a robot between them, where it can stand before an
-object (place_graph.py). Relations between objects, which depend on who asks, are computed when asked for.
-Source: paper, section "Method" (G = (N, E), the boolean inter-layer edges). Departs: it has no place graph.
+The edges between layers are the parent ids. Beside them the place graph is stored (place_graph.py): connections between
+rooms (C3: doors, openings, stairs), route segments, approach poses. Spatial relations between objects are not stored:
+they depend on the viewpoint and are computed when asked for.
+Source: paper, section "Method" (G = (N, E), the boolean inter-layer edges). Not in the paper: the place graph.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph.place_graph import (
     Approach,
     Connection,
-    Way,
+    RouteSegment,
     approach_from_dict,
     approach_to_dict,
     check_approach,
     check_connection,
-    check_way,
+    check_route_segment,
     connection_from_dict,
     connection_key,
     connection_to_dict,
     rounded,
-    way_from_dict,
-    way_to_dict,
+    route_segment_from_dict,
+    route_segment_to_dict,
 )
 
 VERSION = 2  # 2: connections, ways and approaches
@@ -74,8 +74,8 @@ class Node:
     observations: int = 0
     oriented_box: tuple[float, ...] = ()  # objects: centre x y z, size x y z, yaw in rad about z
     color: tuple[int, ...] = ()  # objects: sRGB median
-    approach: Approach | None = None  # objects: where to stand to face it; None where there is no such place
-    front: tuple[float, ...] = ()  # imported objects: x y of the direction that their front faces; () where unknown
+    approach: Approach | None = None  # objects: where to stand to face it; None when there is no such place
+    front: tuple[float, ...] = ()  # imported objects: direction (x, y) of their front; () when unknown
 
     @property
     def layer(self) -> str:
@@ -94,42 +94,44 @@ class Node:
 
     @property
     def turned_box(self) -> tuple[float, ...]:
-        """The oriented box; of a node without one its box, not turned, in the same seven numbers."""
+        """The oriented box: centre x y z, size x y z, yaw; of a node without one its axis-aligned box."""
         return self.oriented_box or (*self.center.tolist(), *(self.box[1] - self.box[0]).tolist(), 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SceneGraph:
-    """Nodes and connections by id, and ways. Build it with `SceneGraph.of`, which checks the invariants."""
+    """Nodes and connections by id, and route segments. Build it with `SceneGraph.of`, which checks the invariants."""
 
     nodes: dict[str, Node] = field(default_factory=dict)
     connections: dict[str, Connection] = field(default_factory=dict)
-    ways: tuple[Way, ...] = ()
+    route_segments: tuple[RouteSegment, ...] = ()
 
     @classmethod
-    def of(cls, nodes: Iterable[Node], connections: Iterable[Connection] = (), ways: Iterable[Way] = ()) -> SceneGraph:
-        """Make and check a graph; raises SchemaError naming what breaks an invariant."""
+    def of(
+        cls, nodes: Iterable[Node], connections: Iterable[Connection] = (), route_segments: Iterable[RouteSegment] = ()
+    ) -> SceneGraph:
+        """Build and check a graph; raises SchemaError naming what breaks an invariant."""
         listed, joined = list(nodes), list(connections)
         ids = [*(node.id for node in listed), *(connection.id for connection in joined)]
         if len(set(ids)) != len(ids):
             raise SchemaError(f"scene graph: id {Counter(ids).most_common(1)[0][0]} appears more than once")
         graph = cls(
             nodes={node.id: node for node in sorted(listed, key=lambda node: id_key(node.id))},
-            connections={one.id: one for one in sorted(joined, key=lambda one: connection_key(one.id))},
-            ways=tuple(sorted(ways, key=lambda way: (id_key(way.room), way.ends))),
+            connections={door.id: door for door in sorted(joined, key=lambda door: connection_key(door.id))},
+            route_segments=tuple(sorted(route_segments, key=lambda segment: (id_key(segment.room), segment.ends))),
         )
         graph.check()
         return graph
 
     def with_nodes(self, nodes: Iterable[Node]) -> SceneGraph:
-        """The same connections and ways with other nodes; raises SchemaError."""
-        return SceneGraph.of(nodes, self.connections.values(), self.ways)
+        """The same connections and route segments with other nodes; raises SchemaError."""
+        return SceneGraph.of(nodes, self.connections.values(), self.route_segments)
 
     def check(self) -> None:
         """Check the invariants. Raises SchemaError naming what breaks one.
 
-        One building; each parent present and in an allowed layer; boxes ordered and finite; connections and ways of
-        rooms that exist, widths above 0, no length below the straight line.
+        One building; each parent present and in an allowed layer; boxes ordered and finite; connections and route
+        segments in rooms that exist; widths above 0; no length below the straight line.
         """
         buildings = [node.id for node in self.nodes.values() if node.layer == "building"]
         if len(buildings) != 1:
@@ -139,8 +141,8 @@ class SceneGraph:
         rooms = frozenset(node.id for node in self.layer("room"))
         for connection in self.connections.values():
             check_connection(connection, rooms)
-        for way in self.ways:
-            check_way(way, self.connections, rooms)
+        for segment in self.route_segments:
+            check_route_segment(segment, self.connections, rooms)
         for node in self.nodes.values():
             if node.approach is not None:
                 check_approach(f"scene graph node {node.id}", node.approach, self.room_of(node.id), self.connections)
@@ -168,10 +170,10 @@ class SceneGraph:
 
     @cached_property
     def _children(self) -> dict[str, tuple[str, ...]]:
-        found: dict[str, list[str]] = {}
+        ids_by_parent: dict[str, list[str]] = {}
         for node in self.nodes.values():
-            found.setdefault(node.parent, []).append(node.id)
-        return {parent: tuple(ids) for parent, ids in found.items()}
+            ids_by_parent.setdefault(node.parent, []).append(node.id)
+        return {parent: tuple(ids) for parent, ids in ids_by_parent.items()}
 
     @property
     def building(self) -> Node:
@@ -188,12 +190,12 @@ class SceneGraph:
 
     def descendants(self, node_id: str, layer: str) -> list[Node]:
         """All nodes of `layer` below a node, by id number."""
-        found, tops = [], [node_id]
-        for top in tops:  # grows while it is walked
-            below = self.children(top)
-            tops += [node.id for node in below]
-            found += [node for node in below if node.layer == layer]
-        return sorted(found, key=lambda node: id_key(node.id))
+        nodes, parent_ids = [], [node_id]
+        for parent_id in parent_ids:  # grows during the loop
+            children = self.children(parent_id)
+            parent_ids += [child.id for child in children]
+            nodes += [child for child in children if child.layer == layer]
+        return sorted(nodes, key=lambda node: id_key(node.id))
 
     def path(self, node_id: str) -> list[Node]:
         """From the building down to the node itself."""
@@ -203,7 +205,7 @@ class SceneGraph:
         return chain[::-1]
 
     def room_of(self, node_id: str) -> str:
-        """The id of the room that a node is, or is in; "" for a floor and the building."""
+        """The id of the room that contains a node (of a room its own); "" for a floor and the building."""
         return next((node.id for node in self.path(node_id) if node.layer == "room"), "")
 
     def to_json(self) -> str:
@@ -212,7 +214,7 @@ class SceneGraph:
             "version": VERSION,
             "nodes": [_node_to_dict(node) for node in self.nodes.values()],
             "connections": [connection_to_dict(connection) for connection in self.connections.values()],
-            "ways": [way_to_dict(way) for way in self.ways],
+            "ways": [route_segment_to_dict(segment) for segment in self.route_segments],
         }
         return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
@@ -232,7 +234,7 @@ class SceneGraph:
         return cls.of(
             (_node_from_dict(entry, f"{where}: nodes[{i}]") for i, entry in enumerate(data["nodes"])),
             [connection_from_dict(entry, f"{where}: connections[{i}]") for i, entry in enumerate(data["connections"])],
-            [way_from_dict(entry, f"{where}: ways[{i}]") for i, entry in enumerate(data["ways"])],
+            [route_segment_from_dict(entry, f"{where}: ways[{i}]") for i, entry in enumerate(data["ways"])],
         )
 
     def save(self, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Objects from elsewhere: a plain JSON list of named boxes, read without any image (README, "Other data").
+"""Object lists of other programs: a JSON list of named boxes, read without any image (README, "Other data").
 
     {"objects": [{"id": 7, "tags": ["chair"], "center": [1, 2, 0.5], "size": [0.5, 0.5, 1],
                   "color": "red", "front": [0, 1], "room": "r1"}],
@@ -6,7 +6,7 @@
      "floors": [{"id": 0, "name": "ground floor", "bottom": 0, "top": 2.6}]}
 
 Metres, z up. Only `objects` with `id`, `tags`, `center` and `size` are needed; fields of other names are not read.
-Ids are the lister's own, texts or whole numbers. `scene.py` makes the graph.
+Ids are those of the other program, texts or whole numbers. `object_list_import.py` makes the scene graph.
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ from placegraph.runtime.scene_graph import Tag
 
 logger = logging.getLogger(__name__)
 
-OwnId = str | int  # as the lister calls it
+SourceId = str | int  # an id in the list
 
+# all chosen by hand
 MAX_M = 1e6  # no building is larger, and no sum of squares overflows
 MAX_TEXT = 200  # characters of an id or a name
-LATER_NAME = 0.5  # weight of the names after the first, where a list gives none: other words for it, or less sure ones
+SECONDARY_NAME_WEIGHT = 0.5  # of the names after the first, where the list has no weights
 
 
 def _text(value: object, what: str) -> str:
@@ -43,7 +44,7 @@ def _text(value: object, what: str) -> str:
     return value
 
 
-def _id(value: object) -> OwnId:
+def _id(value: object) -> SourceId:
     return value if type(value) is int else _text(value, "an id, text or a whole number")
 
 
@@ -60,7 +61,9 @@ def _tags(value: object) -> tuple[Tag, ...]:
         raise ValueError(f"expected {what}")
     tags = []
     for i, entry in enumerate(value):
-        name, weight = entry if isinstance(entry, list) and len(entry) == 2 else (entry, LATER_NAME if i else 1.0)
+        name, weight = (
+            entry if isinstance(entry, list) and len(entry) == 2 else (entry, SECONDARY_NAME_WEIGHT if i else 1.0)
+        )
         tags.append(Tag(_text(name, what).lower(), _numbers([weight], (1,), "weights", 0.0)[0]))
     return tuple(sorted(tags, key=lambda tag: -tag.weight))
 
@@ -102,8 +105,8 @@ def _or_none(check: Callable[[object], Any]) -> PlainValidator:
     return PlainValidator(lambda value: None if value is None else check(value))
 
 
-Id = Annotated[OwnId, PlainValidator(_id)]
-MaybeId = Annotated[OwnId | None, _or_none(_id)]
+Id = Annotated[SourceId, PlainValidator(_id)]
+MaybeId = Annotated[SourceId | None, _or_none(_id)]
 Name = Annotated[str | None, _or_none(lambda value: _text(value, "a name"))]
 Tags = Annotated[tuple[Tag, ...], PlainValidator(_tags)]
 Metres = Annotated[float | None, _or_none(lambda value: _numbers([value], (1,), "metres")[0])]
@@ -126,16 +129,16 @@ class ListedObject(_Entry):
     room: MaybeId = None
 
     @property
-    def names(self) -> tuple[Tag, ...]:
-        """Its tags; a colour word makes one more ("red chair"), which has the word but is never all of a noun."""
+    def all_tags(self) -> tuple[Tag, ...]:
+        """Its tags; a colour word adds one ("red chair"), with less weight than the name without the word."""
         if not isinstance(self.color, str):
             return self.tags
         noun, weight = (self.tags[0].name, self.tags[0].weight) if self.tags else ("object", 1.0)
-        return (*self.tags, Tag(f"{self.color} {noun}", weight * LATER_NAME))
+        return (*self.tags, Tag(f"{self.color} {noun}", weight * SECONDARY_NAME_WEIGHT))
 
 
 class ListedRoom(_Entry):
-    """One room; where it is follows from its outline, else its box, else the objects in it."""
+    """One room; its place is its outline, else its box, else that of the objects in it."""
 
     name: Name = None
     tags: Tags = ()
@@ -151,14 +154,14 @@ class ListedRoom(_Entry):
         return self
 
     @property
-    def names(self) -> tuple[Tag, ...]:
+    def all_tags(self) -> tuple[Tag, ...]:
         """Its name, then its tags."""
         first = (Tag(self.name, max([1.0, *(tag.weight for tag in self.tags)])),) if self.name else ()
         return first + tuple(tag for tag in self.tags if tag.name != self.name)
 
 
 class ListedFloor(_Entry):
-    """One storey; without a bottom it lies where its rooms are."""
+    """One floor; without a bottom it is where its rooms are."""
 
     name: Name = None
     bottom: Metres = None
@@ -172,7 +175,7 @@ class ListedFloor(_Entry):
 
 
 class ObjectList(BaseModel):
-    """The whole file. Rooms or floors that are left out are those that objects and rooms name."""
+    """The whole file. Without `rooms` (`floors`) they are those that the objects (rooms) name."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
@@ -181,8 +184,8 @@ class ObjectList(BaseModel):
     floors: list[ListedFloor] | None = None
 
 
-def read_listed(data: object, where: str) -> ObjectList:
-    """Check a list's fields and that its ids are clear; raises SchemaError naming `where`, the index and the field."""
+def parse_object_list(data: object, where: str) -> ObjectList:
+    """Check the fields of a list and its ids; raises SchemaError naming `where`, the index and the field."""
     try:
         listed = ObjectList.model_validate(data)
     except ValidationError as error:
@@ -191,23 +194,23 @@ def read_listed(data: object, where: str) -> ObjectList:
         reason = first["msg"].removeprefix("Value error, ")
         raise SchemaError(": ".join(part for part in (where, at, reason) if part)) from None
     for layer in ("objects", "rooms", "floors"):
-        seen: dict[OwnId, int] = {}
+        seen: dict[SourceId, int] = {}
         for i, entry in enumerate(getattr(listed, layer) or ()):
             if (first_at := seen.setdefault(entry.id, i)) != i:
                 raise SchemaError(f"{where}: {layer}[{i}].id: {entry.id!r} is also the id of {layer}[{first_at}]")
     for layer, up in (("objects", "room"), ("rooms", "floor")):
-        places = getattr(listed, f"{up}s")
-        known = None if places is None else {entry.id for entry in places}
+        parents = getattr(listed, f"{up}s")
+        parent_ids = None if parents is None else {entry.id for entry in parents}
         for i, entry in enumerate(getattr(listed, layer) or ()):
-            own = getattr(entry, up)
-            if known is not None and own is not None and own not in known:
-                raise SchemaError(f"{where}: {layer}[{i}].{up}: {own!r} is not the id of a {up}")
-    _tell_unread(listed, where)
+            parent_id = getattr(entry, up)
+            if parent_ids is not None and parent_id is not None and parent_id not in parent_ids:
+                raise SchemaError(f"{where}: {layer}[{i}].{up}: {parent_id!r} is not the id of a {up}")
+    _warn_of_unread_fields(listed, where)
     return listed
 
 
-def _tell_unread(listed: ObjectList, where: str) -> None:
-    """A field with a slip in its name would go unnoticed."""
+def _warn_of_unread_fields(listed: ObjectList, where: str) -> None:
+    """Log the names of unknown fields: a misspelt field would go unnoticed."""
     unread = set(listed.model_extra or ())
     for layer in ("objects", "rooms", "floors"):
         unread |= {f"{layer}.{name}" for entry in getattr(listed, layer) or () for name in entry.model_extra or ()}
@@ -215,8 +218,8 @@ def _tell_unread(listed: ObjectList, where: str) -> None:
         logger.warning("%s: fields that are not read: %s", where, ", ".join(sorted(unread)))
 
 
-def read_json(path: Path) -> Any:
-    """The value in a JSON file; raises SchemaError naming the file."""
+def read_json_file(path: Path) -> Any:
+    """Read a JSON file; raises SchemaError naming the file."""
     try:
         return json.loads(path.read_bytes().decode("utf-8-sig"))  # -sig: some editors write a mark first
     except (OSError, ValueError, RecursionError) as error:

@@ -1,8 +1,8 @@
-"""What joins the rooms of a scene graph: connections, ways between them, and where to stand before an object.
+"""The place graph: connections between rooms, route segments inside rooms, and approach poses of objects.
 
-Rooms are the nodes and connections the edges. Unlike a relation ("left of"), which depends on who asks and is computed
-when asked for, a door is part of the building and is stored. Positions are metres in the world frame, on the floor.
-Source: issue 4, "a place graph: room adjacency, travel distance". The paper has none.
+Rooms are the nodes and connections the edges. Unlike a spatial relation ("left of"), which depends on the viewpoint and
+is computed when asked for, a door is part of the building and is stored. Positions are metres in the world frame, on
+the floor. Not as in the paper, which has no place graph: a robot needs routes and travel distances.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from placegraph.runtime.errors import SchemaError
 
 KINDS = ("door", "opening", "stairs")
 CONNECTION_ID = re.compile(r"C(0|[1-9][0-9]*)")
-ROUNDING_M = 0.01  # lengths and positions are kept to 1 mm each; a way of several points adds theirs up
+ROUNDING_M = 0.01  # lengths and positions are rounded to 1 mm; along several points the rounding adds up
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Connection:
-    """A passage between two rooms; ends (2, 3) lie in rooms[0] and rooms[1], of stairs the lower one first."""
+    """A passage between two rooms; its ends are in rooms[0] and rooms[1], of stairs the lower one first."""
 
     id: str
     kind: str  # one of KINDS
     rooms: tuple[str, str]
-    ends: F64  # of a door and an opening both are its middle
+    ends: F64  # (2, 3); of a door and an opening both are its middle
     width_m: float
     length_m: float  # of the path between the ends: 0 for a door
 
     def end_in(self, room: str) -> F64:
-        """(3,) where the connection begins for who stands in one of its rooms."""
+        """(3,) the end that is in one of its rooms."""
         return np.asarray(self.ends[self.rooms.index(room)])
 
-    def other(self, room: str) -> str:
-        """The room behind it."""
+    def room_beyond(self, room: str) -> str:
+        """The room on the other side."""
         return self.rooms[1 - self.rooms.index(room)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Way:
-    """The shortest way of a robot inside one room; an end is a connection's id, or the room's own: its middle."""
+class RouteSegment:
+    """The shortest path of a robot inside one room; an end is a connection's id, or the room's id for its middle."""
 
     room: str
     ends: tuple[str, str]
@@ -55,11 +55,11 @@ class Way:
 
 @dataclass(frozen=True)
 class Approach:
-    """Where a robot can stand to face an object, and how far that is from its room's connections and middle."""
+    """Where a robot can stand to face an object, and the travel distances from its room's connections and middle."""
 
     position: tuple[float, float, float]  # of the robot's middle on the floor
     yaw_rad: float  # about z, 0 along x
-    travel_m: tuple[tuple[str, float], ...]  # (id as in Way.ends, metres); empty when it cannot be reached
+    travel_m: tuple[tuple[str, float], ...]  # (id as in RouteSegment.ends, metres); empty when it cannot be reached
 
 
 def connection_key(connection_id: str) -> int:
@@ -87,16 +87,21 @@ def check_connection(connection: Connection, rooms: frozenset[str]) -> None:
     _check_length(where, connection.length_m, float(np.linalg.norm(connection.ends[1] - connection.ends[0])))
 
 
-def check_way(way: Way, connections: Mapping[str, Connection], rooms: frozenset[str]) -> None:
+def check_route_segment(segment: RouteSegment, connections: Mapping[str, Connection], rooms: frozenset[str]) -> None:
     """Room and ends exist and meet; the length is at least the straight line. Raises SchemaError."""
-    where = f"scene graph way {way.ends} in {way.room}"
-    if way.room not in rooms:
-        raise SchemaError(f"{where}: {way.room} is no room of the graph")
-    for end in way.ends:
-        _check_end(where, end, way.room, connections)
-    if way.points.ndim != 2 or way.points.shape[1] != 2 or len(way.points) < 2 or not np.isfinite(way.points).all():
+    where = f"scene graph way {segment.ends} in {segment.room}"
+    if segment.room not in rooms:
+        raise SchemaError(f"{where}: {segment.room} is no room of the graph")
+    for end in segment.ends:
+        _check_end(where, end, segment.room, connections)
+    if (
+        segment.points.ndim != 2
+        or segment.points.shape[1] != 2
+        or len(segment.points) < 2
+        or not np.isfinite(segment.points).all()
+    ):
         raise SchemaError(f"{where}: points must be (K, 2), K >= 2, and finite")
-    _check_length(where, way.length_m, float(np.linalg.norm(way.points[-1] - way.points[0])))
+    _check_length(where, segment.length_m, float(np.linalg.norm(segment.points[-1] - segment.points[0])))
 
 
 def check_approach(where: str, approach: Approach, room: str, connections: Mapping[str, Connection]) -> None:
@@ -154,20 +159,20 @@ def connection_from_dict(entry: Any, where: str) -> Connection:
         raise SchemaError(f"{where}: {type(error).__name__}: {error}") from None
 
 
-def way_to_dict(way: Way) -> dict[str, Any]:
+def route_segment_to_dict(segment: RouteSegment) -> dict[str, Any]:
     """A way's entry in the canonical JSON."""
     return {
-        "room": way.room,
-        "ends": list(way.ends),
-        "length_m": rounded(way.length_m, 3),
-        "points": rounded(way.points, 3),
+        "room": segment.room,
+        "ends": list(segment.ends),
+        "length_m": rounded(segment.length_m, 3),
+        "points": rounded(segment.points, 3),
     }
 
 
-def way_from_dict(entry: Any, where: str) -> Way:
+def route_segment_from_dict(entry: Any, where: str) -> RouteSegment:
     """Read what way_to_dict made; raises SchemaError."""
     try:
-        return Way(
+        return RouteSegment(
             room=str(entry["room"]),
             ends=_pair(entry["ends"]),
             length_m=float(entry["length_m"]),
@@ -198,5 +203,5 @@ def approach_from_dict(entry: Any) -> Approach | None:
 
 
 def _pair(values: Any) -> tuple[str, str]:
-    one, other = values
-    return str(one), str(other)
+    first, second = values
+    return str(first), str(second)

@@ -1,8 +1,8 @@
-"""The shortest way through the place graph of a scene graph: from a room, an object or a point to a room or object.
+"""The shortest route through the place graph of a scene graph: from a room, object or point to a room or object.
 
-Inside rooms the stored ways are used. Where none is stored (from a point, or between two objects of one room) the
-straight line stands in, and the route says so.
-Source: issue 4, "room-to-room paths"; Dijkstra's algorithm. The paper has none.
+Inside rooms the stored route segments are used. Where none is stored (from a point, or between two objects of one room)
+the route has a straight line instead and is marked `straight`.
+Not in the paper. Source: Dijkstra's algorithm.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ import numpy as np
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.scene_graph import SceneGraph
 
-_State = tuple[str, str]  # a connection and the room on whose side of it one is; "" for start and goal
+_State = tuple[str, str]  # a connection ("" for start and goal) and the room on this side of it
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """Rooms and connections in turn, length, and way points (K, 3) in metres, world frame."""
+    """Rooms and connections in turn, length, and waypoints (K, 3) in metres, world frame."""
 
     ids: tuple[str, ...]  # room, connection, room, ..., room
     length_m: float
     points: F64
-    straight: bool  # part of it is a straight line that nobody has checked
+    straight: bool  # part of it is a straight line that was not checked for obstacles
 
 
 @dataclass(frozen=True, eq=False)
-class _End:
-    """Start or goal: its room, and the metres from it to the ends of that room's ways (ids as in Way.ends)."""
+class _Endpoint:
+    """Start or goal: its room, and the metres from it to the ends of that room's segments (RouteSegment.ends)."""
 
     room: str
     distance_m: dict[str, float]
@@ -43,25 +43,24 @@ def room_at(graph: SceneGraph, xyz_world: F64) -> str:
     rooms = graph.layer("room")
     if not rooms:
         return ""
-    # a floor is stood on: the highest that is not above the point
-    lows = sorted({float(room.box[0, 2]) for room in rooms})
-    low = max((one for one in lows if one <= xyz_world[2]), default=lows[0])
-    here = [room for room in rooms if float(room.box[0, 2]) == low]
-    return min(here, key=lambda room: _distance_to(room.footprint, xyz_world[:2])).id
+    # the point is on the highest floor that is not above it
+    heights = sorted({float(room.box[0, 2]) for room in rooms})
+    floor_z = max((z for z in heights if z <= xyz_world[2]), default=heights[0])
+    candidates = [room for room in rooms if float(room.box[0, 2]) == floor_z]
+    return min(candidates, key=lambda room: _distance_to(room.footprint, xyz_world[:2])).id
 
 
 def find_route(graph: SceneGraph, start: str | F64, goal: str) -> Route | None:
-    """The shortest route; None where no way is known. `start`: id of a room or object, or a point (3,), world frame.
+    """The shortest route; None where no route is known. `start`: id of a room or object, or a point (3,), world frame.
 
     `goal`: id of a room or object; a location counts as its room.
     """
-    a, b = _end_of(graph, start), _end_of(graph, goal)
+    a, b = _endpoint(graph, start), _endpoint(graph, goal)
     if a is None or b is None:
         return None
     if a.room == b.room:
-        return _within(graph, a, b)
-    before: dict[_State, _State] = {}
-    best: dict[_State, float] = {}
+        return _route_within_room(a, b)
+    previous: dict[_State, _State] = {}
     queue: list[tuple[float, _State, _State]] = [
         (length, (end, a.room), ("", a.room))
         for end, length in sorted(a.distance_m.items())
@@ -69,86 +68,88 @@ def find_route(graph: SceneGraph, start: str | F64, goal: str) -> Route | None:
     ]
     heapq.heapify(queue)
     while queue:
-        length, state, came = heapq.heappop(queue)
-        if state in best:
+        length, state, came_from = heapq.heappop(queue)
+        if state in previous:
             continue
-        best[state], before[state] = length, came
+        previous[state] = came_from
         if not state[0]:
-            return _route(graph, a, b, before, length)
-        for step, further in _steps(graph, state, b):
-            if step not in best:
-                heapq.heappush(queue, (length + further, step, state))
+            return _route(graph, a, b, previous, length)
+        for neighbour, distance in _neighbours(graph, state, b):
+            if neighbour not in previous:
+                heapq.heappush(queue, (length + distance, neighbour, state))
     return None
 
 
-def _steps(graph: SceneGraph, state: _State, goal: _End) -> list[tuple[_State, float]]:
-    at, room = state
-    connection = graph.connections[at]
-    found: list[tuple[_State, float]] = [((at, connection.other(room)), connection.length_m)]
-    for way in graph.ways:
-        if way.room == room and at in way.ends and room not in way.ends:
-            found.append(((way.ends[1 - way.ends.index(at)], room), way.length_m))
-    if room == goal.room and at in goal.distance_m:
-        found.append((("", room), goal.distance_m[at]))
-    return found
+def _neighbours(graph: SceneGraph, state: _State, goal: _Endpoint) -> list[tuple[_State, float]]:
+    """The states that can be reached directly from a state, and the metres to each."""
+    connection_id, room = state
+    connection = graph.connections[connection_id]
+    neighbours: list[tuple[_State, float]] = [((connection_id, connection.room_beyond(room)), connection.length_m)]
+    for segment in graph.route_segments:
+        if segment.room == room and connection_id in segment.ends and room not in segment.ends:
+            neighbours.append(((segment.ends[1 - segment.ends.index(connection_id)], room), segment.length_m))
+    if room == goal.room and connection_id in goal.distance_m:
+        neighbours.append((("", room), goal.distance_m[connection_id]))
+    return neighbours
 
 
-def _end_of(graph: SceneGraph, place: str | F64) -> _End | None:
+def _endpoint(graph: SceneGraph, place: str | F64) -> _Endpoint | None:
     if not isinstance(place, str):
         xyz = np.asarray(place, float)
         room = room_at(graph, xyz)
         if not room:
             return None
-        feet = np.array([*xyz[:2], graph.nodes[room].box[0, 2]])
-        ends = {one.id: one.end_in(room) for one in graph.connections.values() if room in one.rooms}
-        return _End(room, {i: float(np.linalg.norm(end - feet)) for i, end in ends.items()}, feet, straight=True)
+        on_floor = np.array([*xyz[:2], graph.nodes[room].box[0, 2]])
+        ends = {door.id: door.end_in(room) for door in graph.connections.values() if room in door.rooms}
+        distances = {connection_id: float(np.linalg.norm(end - on_floor)) for connection_id, end in ends.items()}
+        return _Endpoint(room, distances, on_floor, straight=True)
     room = graph.room_of(place)
     if not room:
         return None
     if graph.nodes[place].layer == "object":
         approach = graph.nodes[place].approach
-        return None if approach is None else _End(room, dict(approach.travel_m), np.array(approach.position))
-    here = [way for way in graph.ways if way.room == room and room in way.ends]
-    return _End(room, {way.ends[1 - way.ends.index(room)]: way.length_m for way in here}, None)
+        return None if approach is None else _Endpoint(room, dict(approach.travel_m), np.array(approach.position))
+    to_middle = [segment for segment in graph.route_segments if segment.room == room and room in segment.ends]
+    lengths = {segment.ends[1 - segment.ends.index(room)]: segment.length_m for segment in to_middle}
+    return _Endpoint(room, lengths, None)
 
 
-def _within(graph: SceneGraph, a: _End, b: _End) -> Route:
-    """A route that stays in one room."""
-    points = [one.point for one in (a, b) if one.point is not None]
+def _route_within_room(a: _Endpoint, b: _Endpoint) -> Route:
+    points = [endpoint.point for endpoint in (a, b) if endpoint.point is not None]
     if len(points) < 2:
-        length = sum(one.distance_m.get(one.room, 0.0) for one in (a, b))
+        length = sum(endpoint.distance_m.get(endpoint.room, 0.0) for endpoint in (a, b))
         return Route((a.room,), length, np.array(points).reshape(-1, 3), a.straight)
     return Route((a.room,), float(np.linalg.norm(points[1] - points[0])), np.stack(points), straight=True)
 
 
-def _route(graph: SceneGraph, a: _End, b: _End, before: dict[_State, _State], length_m: float) -> Route:
+def _route(graph: SceneGraph, a: _Endpoint, b: _Endpoint, previous: dict[_State, _State], length_m: float) -> Route:
     states = [("", b.room)]
-    while states[-1] in before and (states[-1] != ("", a.room)):
-        states.append(before[states[-1]])
-    states = states[-2:0:-1]  # without the two ends: connections with their sides, in order
+    while states[-1] in previous and (states[-1] != ("", a.room)):
+        states.append(previous[states[-1]])
+    states = states[-2:0:-1]  # without start and goal: connections with their sides, in order
     ids, points = [a.room], [] if a.point is None else [a.point[None]]
-    came = a.room if a.point is None else ""
+    came_from = a.room if a.point is None else ""
     for connection_id, room in states:
         if room == ids[-1]:  # through the room, up to the connection
-            points.append(_points(graph, room, came, connection_id))
+            points.append(_segment_points(graph, room, came_from, connection_id))
         else:
             ids += [connection_id, room]
             points.append(graph.connections[connection_id].end_in(room)[None])
-        came = connection_id
-    points.append(_points(graph, b.room, came, b.room) if b.point is None else b.point[None])
+        came_from = connection_id
+    points.append(_segment_points(graph, b.room, came_from, b.room) if b.point is None else b.point[None])
     line = np.concatenate(points)
-    kept = np.r_[True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 0]
-    return Route(tuple(ids), length_m, line[kept], a.straight)
+    distinct = np.r_[True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 0]
+    return Route(tuple(ids), length_m, line[distinct], a.straight)
 
 
-def _points(graph: SceneGraph, room: str, came: str, to: str) -> F64:
-    """(K, 3) of the stored way between two ends in a room; of none the connection's end alone."""
-    low = float(graph.nodes[room].box[0, 2])
-    for way in graph.ways:
-        if way.room == room and set(way.ends) == {came, to}:
-            line = way.points if way.ends[0] == came else way.points[::-1]
-            return np.column_stack((line, np.full(len(line), low)))
-    return graph.connections[to].end_in(room)[None]
+def _segment_points(graph: SceneGraph, room: str, start: str, end: str) -> F64:
+    """(K, 3) of the stored segment between two ends in a room; the connection's end alone if there is none."""
+    floor_z = float(graph.nodes[room].box[0, 2])
+    for segment in graph.route_segments:
+        if segment.room == room and set(segment.ends) == {start, end}:
+            line = segment.points if segment.ends[0] == start else segment.points[::-1]
+            return np.column_stack((line, np.full(len(line), floor_z)))
+    return graph.connections[end].end_in(room)[None]
 
 
 def _distance_to(footprint: F64, xy: F64) -> float:

@@ -3,7 +3,7 @@ import threading
 import psutil
 import pytest
 
-from placegraph.runtime.bus.session import Bus, BusConfig, Request
+from placegraph.runtime.bus.session import Bus, BusConfig, IncomingQuery
 from placegraph.runtime.errors import ConfigError, QueryError
 
 pytestmark = pytest.mark.bus
@@ -53,7 +53,7 @@ def test_nobody_there(bus_config, monkeypatch) -> None:
 
 
 def test_questions_and_replies(bus_config) -> None:
-    def on_request(request: Request) -> None:
+    def on_request(request: IncomingQuery) -> None:
         if request.payload == b"bad":
             request.fail(b"no")
         elif request.payload != b"silent":
@@ -62,7 +62,7 @@ def test_questions_and_replies(bus_config) -> None:
         else:
             kept.append(request)
 
-    kept: list[Request] = []
+    kept: list[IncomingQuery] = []
     with Bus(bus_config, hub=True), Bus(bus_config) as server, Bus(bus_config) as asker:
         with pytest.raises(QueryError, match="nobody answers"):
             asker.ask(b"x", 1.0, "ask")

@@ -74,7 +74,7 @@ def test_live_it_is_not_waited_for_ever_for_a_keyframe_that_is_lost(
     tmp_path: Path, bus_config: BusConfig, monkeypatch, wait_until: Callable[..., None]
 ) -> None:
     monkeypatch.setattr("placegraph.tools.run.FINISH_TIMEOUT_S", 1.0)
-    monkeypatch.setattr("placegraph.runtime.launch.TERMINATE_TIMEOUT_S", 0.5)
+    monkeypatch.setattr("placegraph.runtime.launcher.TERMINATE_TIMEOUT_S", 0.5)
     camera = {"source": "flat", "realtime": True, "limit": 25, "settings": {"width": 64, "height": 48}}
     nodes = {"camera": camera, "pose": {"method": "given"}, "keyframe": {}, "instances": {"model": "drawn_scene"}}
     config = RunConfig(bus=bus_config, nodes=nodes | {"fusion": {}, "hierarchy": {}})

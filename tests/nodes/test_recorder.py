@@ -17,7 +17,7 @@ from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import Context
 from placegraph.runtime.recording import kinds_in, properties, read
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
-from placegraph.runtime.scene_graph.place_graph import Connection, Way
+from placegraph.runtime.scene_graph.place_graph import Connection, RouteSegment
 
 Play = Callable[..., dict[str, list[dict[str, Any]]]]
 
@@ -341,10 +341,10 @@ def test_connections_are_discs_and_lines_and_vanish_with_the_next_graph(play: Pl
     fields: dict[str, Any] = {"rooms": ("R2", "R3"), "width_m": 0.9}
     door = Connection(id="C0", kind="door", ends=np.array([[1.0, 2, 0.5]] * 2), length_m=0.0, **fields)
     climb = Connection(id="C1", kind="stairs", ends=np.array([[1.0, 2, 0.5], [4, 2, 3]]), length_m=4.0, **fields)
-    way = Way(room="R2", ends=("C0", "R2"), length_m=2.0, points=np.array([[1.0, 2], [3, 2]]))
+    segment = RouteSegment(room="R2", ends=("C0", "R2"), length_m=2.0, points=np.array([[1.0, 2], [3, 2]]))
     first = graph(*nodes)
     joined = SceneGraph.from_json(first.json).nodes.values()
-    shown = dataclasses.replace(first, json=SceneGraph.of(joined, [door, climb], [way]).to_json())
+    shown = dataclasses.replace(first, json=SceneGraph.of(joined, [door, climb], [segment]).to_json())
     entities = play([shown, graph(*nodes, frame_id=5)])
     disc, cleared = entities["/world/connections/C0"]
     assert disc["Ellipsoids3D:labels"] == ["C0 door"] and cleared["Clear:is_recursive"] == [False]

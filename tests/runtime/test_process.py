@@ -8,16 +8,16 @@ from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Answer, Graph, LastKeyframe, Message, Question
 from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context, Node, build_node
-from placegraph.runtime.process import Process, ProcessSpec
+from placegraph.runtime.process import NodeProcess, ProcessSpec
 from placegraph.tools.replay import replay_crash
 
 
-def process(node: str | Node, folder: Path) -> Process:
+def process(node: str | Node, folder: Path) -> NodeProcess:
     name = node if isinstance(node, str) else "grounding"
     context = Context(out_dir=str(folder))
     spec = ProcessSpec(node=name, settings={}, context=context, bus=BusConfig(), consumers={}, question_timeout_s=0.05)
-    shell = Process(spec, build_node(name, {}, context) if isinstance(node, str) else node)
-    shell._receipt = lambda payload, attachment: None
+    shell = NodeProcess(spec, build_node(name, {}, context) if isinstance(node, str) else node)
+    shell._send_receipt = lambda payload, attachment: None
     return shell
 
 
@@ -25,10 +25,10 @@ def last_keyframe() -> LastKeyframe:
     return LastKeyframe(frame_id=-1, stamp_ns=0, keyframes=0)
 
 
-def fail(shell: Process) -> None:
-    shell._puts = dict.fromkeys(shell.node.outputs, lambda payload, attachment: None)
+def fail(shell: NodeProcess) -> None:
+    shell._publishers = dict.fromkeys(shell.node.outputs, lambda payload, attachment: None)
     for number in (1, 2):  # the second one is one too many
-        shell._take(Envelope(LastKeyframe, number, encode(last_keyframe())))
+        shell._handle(Envelope(LastKeyframe, number, encode(last_keyframe())))
 
 
 def test_a_step_that_fails_leaves_a_crash_file_that_fails_again(tmp_path: Path, capsys) -> None:
@@ -58,7 +58,7 @@ class SlowAnswers(Node):
 
 
 class Asker:
-    """Stands where the bus's Request stands."""
+    """Stands where the bus's IncomingQuery stands."""
 
     payload = b'{"text": "cup"}'
     replied = False
@@ -71,13 +71,13 @@ class Asker:
 def test_a_question_that_nobody_waits_for_any_more_is_not_stepped(tmp_path: Path, in_time: bool) -> None:
     node, asker = SlowAnswers(None, Context()), Asker()
     shell = process(node, tmp_path)
-    shell._puts = {Question: lambda payload, attachment: None}
-    shell._query_server.take(asker)  # type: ignore[arg-type]
+    shell._publishers = {Question: lambda payload, attachment: None}
+    shell._query_server.receive(asker)  # type: ignore[arg-type]
     envelope = shell.inbox.get(1.0)
     assert envelope is not None
     if not in_time:
         shell._query_server._waiting[envelope.sequence].timer.join()
         assert asker.replied
-    shell._take(envelope)
+    shell._handle(envelope)
     assert node.stepped == int(in_time)
     shell.end()

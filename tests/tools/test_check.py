@@ -72,7 +72,7 @@ def test_a_source_is_checked_with_it(cli, folder_flow, seven, tmp_path) -> None:
             START.replace("[nodes.pose]", "[nodes.camera.settings]\nwdth = 9\n[nodes.pose]"),
             "[nodes.camera.settings] wdth: ",
         ),
-        ('[nodes.camera]\nsource = "flat"\n[nodes.fusion]\n', "fusion takes Keyframe, which nothing gives"),
+        ('[nodes.camera]\nsource = "flat"\n[nodes.fusion]\n', "fusion needs Keyframe, which no node produces"),
         ("[nodes.pose]\n", "expected one source (camera or playback), found none"),
     ],
 )

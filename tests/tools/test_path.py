@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
-from placegraph.runtime.scene_graph.place_graph import Approach, Connection, Way
+from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 
 
 def node(node_id: str, parent: str, name: str = "", **more: object) -> Node:
@@ -28,11 +28,11 @@ def file(tmp_path):
             id="C1", kind="stairs", rooms=("R1", "R2"), ends=np.array([[6.0, 1, 0], [6, 3, 3]]), width_m=1.0, length_m=4
         ),
     ]
-    ways = [
-        Way(room="R0", ends=("C0", "R0"), length_m=2.0, points=np.array([[4.0, 1], [2, 1]])),
-        Way(room="R1", ends=("C0", "C1"), length_m=2.0, points=np.array([[4.0, 1], [6, 1]])),
+    route_segments = [
+        RouteSegment(room="R0", ends=("C0", "R0"), length_m=2.0, points=np.array([[4.0, 1], [2, 1]])),
+        RouteSegment(room="R1", ends=("C0", "C1"), length_m=2.0, points=np.array([[4.0, 1], [6, 1]])),
     ]
-    SceneGraph.of(nodes, connections, ways).save(tmp_path / "graph.json")
+    SceneGraph.of(nodes, connections, route_segments).save(tmp_path / "graph.json")
     return tmp_path / "graph.json"
 
 

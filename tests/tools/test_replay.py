@@ -10,7 +10,7 @@ from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages.codec import encode
 from placegraph.runtime.node import Context, build_node
-from placegraph.runtime.process import Process, ProcessSpec
+from placegraph.runtime.process import NodeProcess, ProcessSpec
 from placegraph.runtime.recording import RecordingWriter, read
 
 QUIET_NODE = {"name_places": False, "use_model": False}
@@ -102,7 +102,7 @@ def crash(tmp_path):
         node="grounding", settings=QUIET_NODE, context=Context(out_dir=str(tmp_path)), question_timeout_s=1.0,
         bus=BusConfig(endpoint="tcp/127.0.0.1:1", prefix="test"), consumers={},
     )  # fmt: skip
-    process = Process(spec, build_node("grounding", QUIET_NODE, spec.context))
+    process = NodeProcess(spec, build_node("grounding", QUIET_NODE, spec.context))
     graph = m.Graph(frame_id=7, stamp_ns=0, revision=2, final=False, named=False, json="{")
     process.inbox.put(Envelope(m.Graph, 1, encode(graph)))
     process.stop()

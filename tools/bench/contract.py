@@ -20,8 +20,8 @@ from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.query.query_server import QueryServer
 from placegraph.runtime.query.reply import Reply
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.runtime.scene_graph.object_list import read_listed
-from placegraph.runtime.scene_graph.object_list_import import scene_of
+from placegraph.runtime.scene_graph.object_list import parse_object_list
+from placegraph.runtime.scene_graph.object_list_import import graph_from_object_list
 from placegraph.tools.bench.fuzz import requests
 from placegraph.tools.simulator.build import build
 from placegraph.tools.simulator.listing import object_list
@@ -59,7 +59,7 @@ class Outcome:
 
 
 class _Asker:
-    """Stands where the bus's Request stands: a payload, and the replies to it."""
+    """Stands where the bus's IncomingQuery stands: a payload, and the replies to it."""
 
     def __init__(self, payload: bytes) -> None:
         self.payload = payload
@@ -70,12 +70,12 @@ class _Asker:
 
 
 def fuzz(count: int, *, mode: str, seed: int, floors: int = 2, settings: dict[str, Any] | None = None) -> Outcome:
-    """Put `count` seeded requests to the question desk and the grounding node, in this process; mode: of all of them.
+    """Put `count` seeded requests to the query server and the grounding node, in this process; mode: of all of them.
 
     The map is that of a generated house with so many floors, as an object list. settings: of the grounding node.
     """
     house = build(seed, floors)
-    graph = scene_of(read_listed(object_list(house), f"house {seed}"), f"house {seed}").graph
+    graph = graph_from_object_list(parse_object_list(object_list(house), f"house {seed}"), f"house {seed}").graph
     texts = [question.text for question in questions(house, seed)]
     outcome, process = Outcome(), psutil.Process()
     with _running(graph, settings or {}) as node:
@@ -106,20 +106,20 @@ def _running(graph: SceneGraph, settings: dict[str, Any]) -> Iterator[Node]:
 
 
 def _put(node: Node, asker: _Asker, mode: str) -> None:
-    """A request's way in a running system, without the bus: desk, message on the wire, node, desk."""
+    """A request's way in a running system, without the bus: query_server, message on the wire, node, query_server."""
 
     def forward(number: int, question: Question) -> None:
         asked = decode(Question, encode(replace(question, mode=mode)))
         answers = [message for message in node.step(asked) if isinstance(message, Answer)]
         if len(answers) != 1:
             raise PlacegraphError(f"{len(answers)} answers from the node")
-        desk.answer(number, decode(Answer, encode(answers[0])).json)
+        query_server.answer(number, decode(Answer, encode(answers[0])).json)
 
-    desk = QueryServer(forward, TIMEOUT_S)
+    query_server = QueryServer(forward, TIMEOUT_S)
     try:
-        desk.take(asker)  # type: ignore[arg-type]  # of the bus's Request it needs what the asker has
+        query_server.receive(asker)  # type: ignore[arg-type]  # of the bus's IncomingQuery it needs what the asker has
     finally:
-        desk.close("the node failed")
+        query_server.close("the node failed")
 
 
 def _judged(replies: list[bytes], graph: SceneGraph, outcome: Outcome) -> tuple[str, list[str]]:

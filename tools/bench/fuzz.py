@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.runtime.query.request import FIELDS, MAX_BYTES, MAX_TEXT
+from placegraph.runtime.query.request import MAX_BYTES, MAX_TEXT, REQUEST_FIELDS
 
 FOREIGN = (
     "où est la chaise à côté de la table", "wo ist der rote Stuhl neben dem Bett?", "найди лампу на столе",
@@ -117,7 +117,7 @@ def _mutated(random: np.random.Generator, texts: Sequence[str]) -> bytes:
 def _wrong(random: np.random.Generator, texts: Sequence[str]) -> bytes:
     fields: dict[str, Any] = {"text": _pick(random, texts)}
     for _ in range(int(random.integers(1, 3))):
-        fields[_pick(random, (*FIELDS, "viewpoint", "txt", ""))] = _pick(random, WRONG)
+        fields[_pick(random, (*REQUEST_FIELDS, "viewpoint", "txt", ""))] = _pick(random, WRONG)
     return json.dumps(fields).encode()
 
 

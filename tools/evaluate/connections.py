@@ -87,14 +87,21 @@ def _travel(graph: SceneGraph, right: Mapping[str, TrueConnection]) -> dict[str,
 def travel_lengths(graph: SceneGraph) -> dict[tuple[str, str], float]:
     """Metres between each two connections of one floor, through any of its rooms; without those that no way joins."""
     floor_of = {room.id: room.parent for room in graph.layer("room")}
-    places = sorted({(end, floor_of[way.room]) for way in graph.ways for end in way.ends if end in graph.connections})
+    places = sorted(
+        {
+            (end, floor_of[segment.room])
+            for segment in graph.route_segments
+            for end in segment.ends
+            if end in graph.connections
+        }
+    )
     number = {place: i for i, place in enumerate(places)}
     # the shortest of several ways: two rooms may be joined by the same two doors
     lengths = np.full((len(places), len(places)), np.inf)
-    for way in graph.ways:
-        if all(end in graph.connections for end in way.ends):
-            i, j = sorted(number[(end, floor_of[way.room])] for end in way.ends)
-            lengths[i, j] = min(lengths[i, j], way.length_m)
+    for segment in graph.route_segments:
+        if all(end in graph.connections for end in segment.ends):
+            i, j = sorted(number[(end, floor_of[segment.room])] for end in segment.ends)
+            lengths[i, j] = min(lengths[i, j], segment.length_m)
     if not len(places):
         return {}
     shortest = dijkstra(csgraph_from_dense(lengths, null_value=np.inf), directed=False)

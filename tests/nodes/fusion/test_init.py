@@ -150,7 +150,7 @@ def test_objects_that_their_views_doubt_are_not_in_the_map(view):
 
 
 def test_a_move_told_with_a_keyframe_whose_segments_were_lost_is_followed(view):
-    node = NODE(NODE.config_type(map_every=1, submap={"keyframes": 1}), Context(given=("Correction",)))
+    node = NODE(NODE.config_type(map_every=1, submap={"keyframes": 1}), Context(produced_kinds=("Correction",)))
     first, lost, third = circle(view, 3)
     moved = first[0].world_from_camera.copy()
     moved[0, 3] += 0.5

@@ -23,7 +23,7 @@ SCENE = {**ROOM, "chair": CHAIR}
 
 
 def make(corrected=True, **settings):
-    return NODE(NODE.config_type(**settings), Context(given=("Correction",) if corrected else ()))
+    return NODE(NODE.config_type(**settings), Context(produced_kinds=("Correction",) if corrected else ()))
 
 
 def correction(frame_id, pose, moved=None):

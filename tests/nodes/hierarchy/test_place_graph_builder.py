@@ -88,7 +88,7 @@ def test_a_small_robot_passes_where_a_large_one_does_not(make_map):
 def test_what_was_not_seen_to_be_free_is_not_passable(make_map):
     points, _ = row(2, [DOOR])
     graph = build(make_map(points, WEST))
-    assert not graph.connections and all(way.room == room_at_x(graph, 1) for way in graph.ways)
+    assert not graph.connections and all(segment.room == room_at_x(graph, 1) for segment in graph.route_segments)
 
 
 def test_what_the_camera_crossed_is_passable(make_map, walk):
@@ -110,9 +110,9 @@ def test_a_route_through_three_rooms_cuts_no_wall(make_map):
     west, middle, east = (room_at_x(graph, x) for x in (2, 6, 10))
     route = find_route(graph, west, east)
     assert [one for one in route.ids if one[0] == "R"] == [west, middle, east] and len(route.ids) == 5
-    (way,) = [way for way in graph.ways if way.room == middle and middle not in way.ends]
+    (segment,) = [segment for segment in graph.route_segments if segment.room == middle and middle not in segment.ends]
     straight = np.hypot(4.0, 2.1)  # from door to door, all of it free
-    assert straight - 0.15 < way.length_m < straight + 0.3
+    assert straight - 0.15 < segment.length_m < straight + 0.3
     for a, b in pairwise(route.points):
         line = a + (b - a) * np.linspace(0, 1, 200)[:, None]
         for x, (low, high) in ((4, (0.5, 1.4)), (8, (2.6, 3.5))):

@@ -3,7 +3,7 @@ import json
 import pytest
 from pydantic import ValidationError
 
-from placegraph.runtime.query.reply import Reply, finished, refusal, to_bytes
+from placegraph.runtime.query.reply import Reply, answered, encode_reply, error_reply
 
 FOUND = {
     "status": "found", "question_id": "Q1", "question": "cup", "object_id": "O1", "name": "cup",
@@ -16,16 +16,16 @@ FOUND = {
 
 
 def test_a_refusal_is_a_reply_with_all_fields() -> None:
-    payload = to_bytes(refusal("why", "Q1", "the cup", 3.21))
+    payload = encode_reply(error_reply("why", "Q1", "the cup", 3.21))
     reply = Reply.model_validate_json(payload)
     assert (reply.error, reply.question_id, reply.question, reply.ms) == ("why", "Q1", "the cup", 3.2)
-    assert set(json.loads(payload)) == set(Reply.model_fields) == set(finished(FOUND, 1.0))
+    assert set(json.loads(payload)) == set(Reply.model_fields) == set(answered(FOUND, 1.0))
 
 
 def test_an_answer_gets_its_time() -> None:
-    reply = Reply.model_validate_json(to_bytes(finished(FOUND, 12.345)))
+    reply = Reply.model_validate_json(encode_reply(answered(FOUND, 12.345)))
     assert reply.ms == 12.3 and reply.error is None
-    assert to_bytes({"b": "é", "a": 1}) == '{"a":1,"b":"é"}'.encode()
+    assert encode_reply({"b": "é", "a": 1}) == '{"a":1,"b":"é"}'.encode()
 
 
 @pytest.mark.parametrize(
@@ -47,4 +47,4 @@ def test_an_answer_gets_its_time() -> None:
 )
 def test_a_reply_that_contradicts_itself_is_none(wrong) -> None:
     with pytest.raises(ValidationError):
-        Reply.model_validate(finished(FOUND, 1.0) | wrong)
+        Reply.model_validate(answered(FOUND, 1.0) | wrong)

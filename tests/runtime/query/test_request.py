@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.query.request import MAX_BYTES, MAX_TEXT, MODES, asked_id, make_question, parse_request
+from placegraph.runtime.query.request import MAX_BYTES, MAX_TEXT, MODES, make_question, parse_request, request_id
 
 
 def test_only_text_is_needed() -> None:
@@ -86,6 +86,6 @@ def test_bad_requests_name_what_is_wrong(payload: bytes, problem: str) -> None:
 
 
 def test_the_id_of_a_bad_request_is_found_where_it_has_one() -> None:
-    assert asked_id(b'{"text": 3, "id": "mine"}') == "mine"
+    assert request_id(b'{"text": 3, "id": "mine"}') == "mine"
     for payload in (b"", b"\xff", b"[1]", b"{}", b'{"id": 4}', b'{"id": "\\ud800"}', b"[" * 60_000, b" " * 70_000):
-        assert asked_id(payload) == ""
+        assert request_id(payload) == ""

@@ -4,17 +4,17 @@ import pytest
 
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Tag
-from placegraph.runtime.scene_graph.object_list import read_json, read_listed
+from placegraph.runtime.scene_graph.object_list import parse_object_list, read_json_file
 
 CHAIR = {"id": "a", "tags": ["chair"], "center": [1, 2, 0.5], "size": [0.5, 0.5, 1]}
 
 
 def read(**changes):
-    return read_listed({"objects": [CHAIR | changes]}, "x.json").objects[0]
+    return parse_object_list({"objects": [CHAIR | changes]}, "x.json").objects[0]
 
 
 def test_nothing_but_objects_is_needed() -> None:
-    assert read_listed({"objects": []}, "x").objects == []
+    assert parse_object_list({"objects": []}, "x").objects == []
     chair = read()
     assert (chair.id, chair.tags, chair.center, chair.color) == ("a", (Tag("chair", 1.0),), [1, 2, 0.5], None)
     assert read(color=None, front=None, room=None).front is None
@@ -23,13 +23,13 @@ def test_nothing_but_objects_is_needed() -> None:
 def test_names_are_strongest_first_or_weighted() -> None:
     assert read(tags=["chair", "seat", "stool"]).tags == (Tag("chair", 1.0), Tag("seat", 0.5), Tag("stool", 0.5))
     assert read(tags=[["seat", 2], ["chair", 3.5]]).tags == (Tag("chair", 3.5), Tag("seat", 2.0))
-    assert read(tags=[]).names == ()
+    assert read(tags=[]).all_tags == ()
 
 
 def test_a_colour_is_a_triple_or_a_word() -> None:
     assert read(color=[255, 0, 12.4]).color == (255, 0, 12) and read(color=[0, 1, 1]).color == (0, 1, 1)
-    assert read(color="Grey").names == (Tag("chair", 1.0), Tag("gray chair", 0.5))
-    assert read(color="light blue", tags=[]).names == (Tag("light blue object", 0.5),)
+    assert read(color="Grey").all_tags == (Tag("chair", 1.0), Tag("gray chair", 0.5))
+    assert read(color="light blue", tags=[]).all_tags == (Tag("light blue object", 0.5),)
 
 
 def test_a_front_is_a_direction_on_the_floor() -> None:
@@ -37,7 +37,7 @@ def test_a_front_is_a_direction_on_the_floor() -> None:
 
 
 def test_ids_keep_their_type() -> None:
-    listed = read_listed({"objects": [CHAIR | {"id": 1}, CHAIR | {"id": "1"}]}, "x")
+    listed = parse_object_list({"objects": [CHAIR | {"id": 1}, CHAIR | {"id": "1"}]}, "x")
     assert [one.id for one in listed.objects] == [1, "1"]
 
 
@@ -103,23 +103,23 @@ def test_a_broken_object_is_named(changes, problem) -> None:
 )
 def test_a_broken_list_is_named(data, problem) -> None:
     with pytest.raises(SchemaError) as raised:
-        read_listed(data, "x")
+        parse_object_list(data, "x")
     assert str(raised.value).startswith(problem)
 
 
 def test_fields_that_are_not_read_are_told(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
-        read_listed({"objects": [CHAIR | {"colour": "red"}], "scan": "scene0000_00"}, "x.json")
+        parse_object_list({"objects": [CHAIR | {"colour": "red"}], "scan": "scene0000_00"}, "x.json")
     assert caplog.messages == ["x.json: fields that are not read: objects.colour, scan"]
 
 
 def test_a_file_that_is_no_json_is_named(tmp_path) -> None:
     file = tmp_path / "x.json"
     file.write_bytes('﻿{"objects": []}'.encode())
-    assert read_json(file) == {"objects": []}
+    assert read_json_file(file) == {"objects": []}
     for content in (b"", b"\xff", b"[" * 100_000, b"1" * 5000):
         file.write_bytes(content)
         with pytest.raises(SchemaError, match=r"x\.json: cannot read"):
-            read_json(file)
+            read_json_file(file)
     with pytest.raises(SchemaError, match="absent"):
-        read_json(tmp_path / "absent")
+        read_json_file(tmp_path / "absent")

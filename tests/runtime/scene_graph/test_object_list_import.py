@@ -7,8 +7,8 @@ import pytest
 
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.runtime.scene_graph.object_list import read_listed
-from placegraph.runtime.scene_graph.object_list_import import load_scene, scene_of
+from placegraph.runtime.scene_graph.object_list import parse_object_list
+from placegraph.runtime.scene_graph.object_list_import import graph_from_object_list, import_graph
 
 
 def thing(own, x, y, z=0.5, tag="chair", **more):
@@ -20,7 +20,7 @@ def square(x0, y0, side):
 
 
 def scene(objects, **places):
-    return scene_of(read_listed({"objects": objects} | places, "x"), "x")
+    return graph_from_object_list(parse_object_list({"objects": objects} | places, "x"), "x")
 
 
 def parents(made):
@@ -114,7 +114,7 @@ def test_five_thousand_objects_load_fast(tmp_path) -> None:
     file = tmp_path / "large.json"
     file.write_text(json.dumps({"objects": objects, "rooms": rooms}))
     began = time.process_time()  # not elapsed: other jobs run on this machine
-    made = load_scene(file)
+    made = import_graph(file)
     assert time.process_time() - began < 1.0
     assert len(made.ids) == 5100
 
@@ -122,12 +122,12 @@ def test_five_thousand_objects_load_fast(tmp_path) -> None:
 def test_files(tmp_path) -> None:
     made = scene([thing("a", 0, 0)])
     made.graph.save(tmp_path / "graph.json")
-    assert load_scene(tmp_path / "graph.json").graph.to_json() == made.graph.to_json()
-    assert load_scene(tmp_path / "graph.json").ids == {}
+    assert import_graph(tmp_path / "graph.json").graph.to_json() == made.graph.to_json()
+    assert import_graph(tmp_path / "graph.json").ids == {}
     for text in ("[]", "{}", "3", '{"nodes": []}'):
         (tmp_path / "x.json").write_text(text)
         with pytest.raises(SchemaError, match=r"x\.json: expected a scene graph, or an object list"):
-            load_scene(tmp_path / "x.json")
+            import_graph(tmp_path / "x.json")
     (tmp_path / "x.json").write_text('{"objects": [{}]}')
     with pytest.raises(SchemaError, match=r"x\.json: objects\[0\]\.id: Field required"):
-        load_scene(tmp_path / "x.json")
+        import_graph(tmp_path / "x.json")

@@ -6,7 +6,7 @@ import pytest
 
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.runtime.scene_graph.place_graph import Approach, Connection, Way
+from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 
 
 def node(node_id: str, parent: str, **more: object) -> Node:
@@ -25,9 +25,9 @@ def door(**changes: object) -> Connection:
     return Connection(**(fields | changes))
 
 
-def way(**changes: object) -> Way:
+def segment(**changes: object) -> RouteSegment:
     points = np.array([[4.0, 1], [6, 1]])
-    return Way(**({"room": "R1", "ends": ("C0", "R1"), "length_m": 2.0, "points": points} | changes))
+    return RouteSegment(**({"room": "R1", "ends": ("C0", "R1"), "length_m": 2.0, "points": points} | changes))
 
 
 APPROACH = Approach((5.0, 1.0, 0.0), 1.5, (("C0", 1.2), ("R1", 0.4)))
@@ -35,15 +35,15 @@ APPROACH = Approach((5.0, 1.0, 0.0), 1.5, (("C0", 1.2), ("R1", 0.4)))
 
 def test_ends_of_a_connection() -> None:
     stairs = door(kind="stairs", ends=np.array([[0.0, 0, 0], [3, 0, 3]]), length_m=4.3)
-    assert stairs.end_in("R1").tolist() == [3, 0, 3] and stairs.other("R1") == "R0"
+    assert stairs.end_in("R1").tolist() == [3, 0, 3] and stairs.room_beyond("R1") == "R0"
 
 
 def test_canonical_json_holds_the_place_graph_and_does_not_depend_on_the_order_of_making() -> None:
     two = door(id="C10"), door(id="C2", rooms=("R1", "R2"))
-    ways = [way(), way(ends=("C10", "C2"), points=np.array([[4.0, 1], [4, 1]]), length_m=0.0)]
-    graph = SceneGraph.of(nodes(APPROACH), [door(), *two], ways)
+    route_segments = [segment(), segment(ends=("C10", "C2"), points=np.array([[4.0, 1], [4, 1]]), length_m=0.0)]
+    graph = SceneGraph.of(nodes(APPROACH), [door(), *two], route_segments)
     text = graph.to_json()
-    assert SceneGraph.of(nodes(APPROACH)[::-1], [*two[::-1], door()], ways[::-1]).to_json() == text
+    assert SceneGraph.of(nodes(APPROACH)[::-1], [*two[::-1], door()], route_segments[::-1]).to_json() == text
     again = SceneGraph.from_json(text)
     assert again.to_json() == text and list(again.connections) == ["C0", "C2", "C10"]
     assert again.nodes["O1"].approach == APPROACH and again.nodes["R0"].approach is None
@@ -52,7 +52,7 @@ def test_canonical_json_holds_the_place_graph_and_does_not_depend_on_the_order_o
 
 
 @pytest.mark.parametrize(
-    ("connections", "ways", "problem"),
+    ("connections", "route_segments", "problem"),
     [
         ([door(id="D0")], [], "'D0' is not a connection's id"),
         ([door(), door()], [], "id C0 appears more than once"),
@@ -63,17 +63,19 @@ def test_canonical_json_holds_the_place_graph_and_does_not_depend_on_the_order_o
         ([door(width_m=0.0)], [], "C0: width_m must be above 0"),
         ([door(ends=np.full((2, 3), np.nan))], [], "C0: ends must be"),
         ([door(ends=np.array([[0.0, 0, 0], [3, 0, 4]]), length_m=4.9)], [], r"not at least the straight line, 5\.000"),
-        ([door()], [way(room="R9")], "R9 is no room"),
-        ([door()], [way(room="R2")], "C0 is neither R2 nor one of its connections"),
-        ([door()], [way(ends=("C0", "C1"))], "C1 is neither R1"),
-        ([door()], [way(length_m=1.9)], "not at least the straight line"),
-        ([door()], [way(length_m=np.inf)], "not at least the straight line"),
-        ([door()], [way(points=np.zeros((1, 2)))], "points must be"),
+        ([door()], [segment(room="R9")], "R9 is no room"),
+        ([door()], [segment(room="R2")], "C0 is neither R2 nor one of its connections"),
+        ([door()], [segment(ends=("C0", "C1"))], "C1 is neither R1"),
+        ([door()], [segment(length_m=1.9)], "not at least the straight line"),
+        ([door()], [segment(length_m=np.inf)], "not at least the straight line"),
+        ([door()], [segment(points=np.zeros((1, 2)))], "points must be"),
     ],
 )
-def test_broken_invariants_are_named(connections: list[Connection], ways: list[Way], problem: str) -> None:
+def test_broken_invariants_are_named(
+    connections: list[Connection], route_segments: list[RouteSegment], problem: str
+) -> None:
     with pytest.raises(SchemaError, match=problem):
-        SceneGraph.of(nodes(), connections, ways)
+        SceneGraph.of(nodes(), connections, route_segments)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.runtime.scene_graph.place_graph import Approach, Connection, Way
+from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 from placegraph.runtime.scene_graph.route import find_route, room_at
 
 BUILDING = Node(
@@ -22,9 +22,11 @@ def passage(connection_id: str, kind: str, rooms: tuple[str, str], low: tuple, h
     return Connection(id=connection_id, kind=kind, rooms=rooms, ends=ends, width_m=0.9, length_m=length)
 
 
-def way(room: str, ends: tuple[str, str], *points: tuple[float, float]) -> Way:
+def segment(room: str, ends: tuple[str, str], *points: tuple[float, float]) -> RouteSegment:
     line = np.array(points, float)
-    return Way(room=room, ends=ends, length_m=float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()), points=line)
+    return RouteSegment(
+        room=room, ends=ends, length_m=float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()), points=line
+    )
 
 
 def approach(x: float, y: float, z: float = 0.0, **travel: float) -> Approach:
@@ -47,13 +49,13 @@ def graph() -> SceneGraph:
         passage("C1", "door", ("R1", "R0"), (4, 3, 0), (4, 3, 0)),
         passage("C2", "stairs", ("R1", "R2"), (5, 3.5, 0), (7, 1, 3), 5.0),
     ]
-    ways = [
-        way("R0", ("C0", "C1"), (4, 1), (4, 3)), way("R0", ("C0", "R0"), (4, 1), (2, 2)),
-        way("R0", ("C1", "R0"), (4, 3), (3, 4), (2, 2)), way("R1", ("C0", "R1"), (4, 1), (7, 1), (6, 2)),
-        way("R1", ("C1", "R1"), (4, 3), (6, 2)), way("R1", ("C1", "C2"), (4, 3), (5, 3.5)),
-        way("R1", ("C0", "C2"), (4, 1), (8, 1), (8, 3.5), (5, 3.5)), way("R2", ("C2", "R2"), (7, 1), (6, 2)),
+    route_segments = [
+        segment("R0", ("C0", "C1"), (4, 1), (4, 3)), segment("R0", ("C0", "R0"), (4, 1), (2, 2)),
+        segment("R0", ("C1", "R0"), (4, 3), (3, 4), (2, 2)), segment("R1", ("C0", "R1"), (4, 1), (7, 1), (6, 2)),
+        segment("R1", ("C1", "R1"), (4, 3), (6, 2)), segment("R1", ("C1", "C2"), (4, 3), (5, 3.5)),
+        segment("R1", ("C0", "C2"), (4, 1), (8, 1), (8, 3.5), (5, 3.5)), segment("R2", ("C2", "R2"), (7, 1), (6, 2)),
     ]  # fmt: skip
-    return SceneGraph.of(nodes, connections, ways)
+    return SceneGraph.of(nodes, connections, route_segments)
 
 
 def test_the_shorter_way_not_the_nearer_door(graph: SceneGraph) -> None:

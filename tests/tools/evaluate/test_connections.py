@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.runtime.scene_graph.place_graph import Connection, Way
+from placegraph.runtime.scene_graph.place_graph import Connection, RouteSegment
 from placegraph.tools.evaluate.connections import connection_scores, match, travel_lengths
 from placegraph.tools.simulator.truth import HouseRun, TrueConnection, Truth
 
@@ -27,18 +27,18 @@ def true_door(i, x, rooms=(0, 1), kind="door", travel=()):
     return TrueConnection(i, kind, rooms, np.array([[x + 1, 2.0, 0.5], [x + 1, 2.0, 0.5 + top]]), 0.9, travel)
 
 
-def way(room, one, other, length):
-    return Way(room=room, ends=(one, other), length_m=length, points=np.zeros((2, 2)))
+def segment(room, one, other, length):
+    return RouteSegment(room=room, ends=(one, other), length_m=length, points=np.zeros((2, 2)))
 
 
-def graph_of(connections, ways=()):
+def graph_of(connections, route_segments=()):
     rooms = [node("R0", "F0"), node("R1", "F0"), node("R2", "F1")]
-    return SceneGraph.of([node("B0", ""), node("F0", "B0"), node("F1", "B0"), *rooms], connections, ways)
+    return SceneGraph.of([node("B0", ""), node("F0", "B0"), node("F1", "B0"), *rooms], connections, route_segments)
 
 
-def scores(connections, true, ways=(), seen=(0, 1, 2)):
+def scores(connections, true, route_segments=(), seen=(0, 1, 2)):
     truth = Truth(HouseRun(0, None, 0, 1, 1, "", 1), (), (), (), (), (), tuple(true))
-    return connection_scores(graph_of(connections, ways), MOVED, truth, frozenset(seen))
+    return connection_scores(graph_of(connections, route_segments), MOVED, truth, frozenset(seen))
 
 
 def test_nothing_found_and_nothing_true():
@@ -53,7 +53,7 @@ def test_a_perfect_map_is_perfect():
     found = scores(
         [door(5, 0), door(6, 4), door(7, 8, ("R1", "R2"), "stairs")],
         [true_door(0, 0, travel=((1, 4.0),)), true_door(1, 4, kind="archway"), true_door(2, 8, kind="stairs")],
-        [way("R0", "C5", "C6", 4.4)],
+        [segment("R0", "C5", "C6", 4.4)],
     )
     for what, count in (("doors", 2), ("stairs", 1)):
         row = found[what]
@@ -83,13 +83,17 @@ def test_each_true_one_is_used_once_and_the_total_distance_decides():
 
 def test_travel_goes_through_any_room_of_the_floor_by_the_shortest_way():
     connections = [door(0, 0), door(1, 3), door(2, 6)]
-    ways = [
-        way("R0", "C0", "C1", 9.0),
-        way("R1", "C0", "C1", 3.0),
-        way("R0", "C1", "C2", 3.5),
-        way("R1", "C1", "R1", 1.0),
+    route_segments = [
+        segment("R0", "C0", "C1", 9.0),
+        segment("R1", "C0", "C1", 3.0),
+        segment("R0", "C1", "C2", 3.5),
+        segment("R1", "C1", "R1", 1.0),
     ]
-    assert travel_lengths(graph_of(connections, ways)) == {("C0", "C1"): 3.0, ("C0", "C2"): 6.5, ("C1", "C2"): 3.5}
+    assert travel_lengths(graph_of(connections, route_segments)) == {
+        ("C0", "C1"): 3.0,
+        ("C0", "C2"): 6.5,
+        ("C1", "C2"): 3.5,
+    }
     assert travel_lengths(graph_of([])) == {}
 
 

@@ -1,12 +1,12 @@
-from placegraph.runtime.scene_graph.object_list import read_listed
-from placegraph.runtime.scene_graph.object_list_import import scene_of
+from placegraph.runtime.scene_graph.object_list import parse_object_list
+from placegraph.runtime.scene_graph.object_list_import import graph_from_object_list
 from placegraph.tools.simulator.build import build
 from placegraph.tools.simulator.listing import object_list
 
 
 def test_a_house_as_a_list_is_that_house() -> None:
     house = build(0, 2)
-    scene = scene_of(read_listed(object_list(house), "house"), "house")
+    scene = graph_from_object_list(parse_object_list(object_list(house), "house"), "house")
     graph = scene.graph
     assert len(graph.layer("object")) == len(house.items) and len(graph.layer("room")) == len(house.rooms)
     for placed in house.items:

@@ -1,4 +1,4 @@
-"""Start processes, wait until they are alive, restart with back-off, stop in order. Leaves no process behind."""
+"""Start the processes of a dataflow, restart those that die, stop them in order. Leaves no process behind."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ from placegraph.runtime.process import ProcessSpec
 
 logger = logging.getLogger(__name__)
 
-START_TIMEOUT_S = 120.0  # models are read from disk, on a small computer
-DRAIN_TIMEOUT_S = 60.0  # to finish what has arrived
-TERMINATE_TIMEOUT_S = 5.0
-TOKEN_TIMEOUT_S = 2.0
-LOG_TAIL_LINES = 12
+# all chosen by hand
+START_TIMEOUT_S = 120.0  # a small computer reads models from a slow disk
+DRAIN_TIMEOUT_S = 60.0  # for a node to step what is in its inbox
+TERMINATE_TIMEOUT_S = 5.0  # from SIGTERM to SIGKILL
+TOKEN_TIMEOUT_S = 2.0  # for Zenoh to report that an ended process is gone
+LOG_TAIL_LINES = 12  # of a dead process's log in its error
 
 
 class RestartBudget:
     """Delays of a node's restarts: 0.5 s doubling to 8 s, at most five within a minute."""
 
-    FIRST_S, LONGEST_S, MAX, PERIOD_S = 0.5, 8.0, 5, 60.0
+    FIRST_DELAY_S, MAX_DELAY_S, MAX_RESTARTS, PERIOD_S = 0.5, 8.0, 5, 60.0
 
     def __init__(self) -> None:
         self._times: deque[float] = deque()
@@ -43,10 +44,10 @@ class RestartBudget:
         """Seconds to wait before the next start, or None when the budget is spent."""
         while self._times and now_s - self._times[0] > self.PERIOD_S:
             self._times.popleft()
-        if len(self._times) >= self.MAX:
+        if len(self._times) >= self.MAX_RESTARTS:
             return None
         self._times.append(now_s)
-        return float(min(self.FIRST_S * 2 ** (len(self._times) - 1), self.LONGEST_S))
+        return float(min(self.FIRST_DELAY_S * 2 ** (len(self._times) - 1), self.MAX_DELAY_S))
 
 
 class Launcher:
@@ -75,7 +76,7 @@ class Launcher:
     def start(self, is_cancelled: Callable[[], bool] = lambda: False) -> None:
         """Start every process and, when all are ready, the source.
 
-        Raises PlacegraphError naming a process that does not get ready, or as soon as `is_cancelled` says so.
+        Raises PlacegraphError naming a process that does not get ready, or when `is_cancelled` returns True.
         """
         (self._out_dir / "log").mkdir(parents=True, exist_ok=True)
         for name in self._dataflow.nodes:
@@ -93,7 +94,7 @@ class Launcher:
         self._bus.put(b"start", "control")
 
     def poll(self) -> None:
-        """Notice processes that ended: restart them or raise PlacegraphError naming the node. Call often."""
+        """Restart processes that ended, or raise PlacegraphError naming the node. Call often."""
         for name, process in self._processes.items():
             if name in self._restart_at or process.poll() is None:
                 continue
@@ -104,7 +105,8 @@ class Launcher:
                 self._raise_if_dead(name)
             delay_s = self._budgets[name].next_delay_s(time.monotonic())
             if delay_s is None:
-                raise PlacegraphError(f"{name} failed {RestartBudget.MAX} times within a minute{self._log_tail(name)}")
+                times = f"{RestartBudget.MAX_RESTARTS} times within a minute"
+                raise PlacegraphError(f"{name} failed {times}{self._log_tail(name)}")
             logger.warning("%s ended with status %d; starting it again in %.1f s", name, process.returncode, delay_s)
             self._restart_at[name] = time.monotonic() + delay_s
         for name in [name for name, at in self._restart_at.items() if time.monotonic() >= at]:
@@ -114,13 +116,13 @@ class Launcher:
             self._bus.put(b"start", "control")
 
     def stop_source(self) -> None:
-        """Let the source end in order, so that the last map and graph follow."""
+        """Ask the source to end, so that the last map and graph follow."""
         name = next(name for name, node in self._dataflow.nodes.items() if node is self._dataflow.source)
         self._stopped.add(name)
         self._bus.put(f"stop {name}".encode(), "control")
 
     def stop(self) -> None:
-        """Stop in the order of the dataflow, each node after it has finished what it got; kills what does not end."""
+        """Stop in the order of the dataflow, each node once its inbox is empty; kills those that do not end."""
         for name in self._dataflow.nodes:
             self._stopped.add(name)
             process = self._processes.get(name)
@@ -133,12 +135,12 @@ class Launcher:
             if not self._wait(process, DRAIN_TIMEOUT_S):
                 logger.warning("%s did not finish within %g s", name, DRAIN_TIMEOUT_S)
                 self._kill(process)
-            # its token goes after its last message: what it gave is on its way before the next node is told to stop
+            # Its token goes after its last message, so all its messages are on their way before the next node stops.
             with self._changed:
                 self._changed.wait_for(lambda name=name: name not in self._alive, TOKEN_TIMEOUT_S)  # type: ignore[misc]
 
     def kill(self) -> None:
-        """End everything at once: what is in flight is lost."""
+        """End all processes at once; what is in flight is lost."""
         self._stopped.update(self._processes)
         for process in self._processes.values():
             if process.poll() is None:
@@ -149,7 +151,7 @@ class Launcher:
                 self._kill(process)
 
     def pids(self) -> dict[str, int]:
-        """Process id of each node."""
+        """Process ids by node name."""
         return {name: process.pid for name, process in self._processes.items()}
 
     def _spawn(self, name: str) -> None:
@@ -172,15 +174,15 @@ class Launcher:
                 stderr=subprocess.STDOUT,
                 env=environment,
             )
-        if (dead := self._processes.get(name)) is not None and dead.stdin is not None:
-            dead.stdin.close()
+        if (previous := self._processes.get(name)) is not None and previous.stdin is not None:
+            previous.stdin.close()
         self._processes[name] = process
         assert process.stdin is not None
         try:
             process.stdin.write(spec.model_dump_json().encode() + b"\n")
-            process.stdin.flush()  # left open: its end tells the child that this process is gone
+            process.stdin.flush()  # left open: the child ends when it reads the end of this pipe
         except BrokenPipeError:
-            pass  # it died at once; poll and start report that with its log
+            pass  # the child died at once; poll and start report that with its log
 
     def _on_alive(self, name: str, present: bool) -> None:
         with self._changed:
@@ -190,10 +192,10 @@ class Launcher:
     def _raise_if_dead(self, name: str) -> None:
         status = self._processes[name].poll()
         if status is not None:
-            how = f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
+            ending = f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
             errors = [line for line in self._log_lines(name) if f" ERROR {name} " in line]
             cause = errors[-1].partition(f" ERROR {name} ")[2] if errors else ""
-            raise PlacegraphError(f"{name} {how}{': ' if cause else ''}{cause}{self._log_tail(name)}")
+            raise PlacegraphError(f"{name} {ending}{': ' if cause else ''}{cause}{self._log_tail(name)}")
 
     def _log_path(self, name: str) -> Path:
         return self._out_dir / "log" / f"{name}.log"
@@ -202,7 +204,8 @@ class Launcher:
         return self._log_path(name).read_text(errors="replace").splitlines()[-LOG_TAIL_LINES:]
 
     def _log_tail(self, name: str) -> str:
-        return "".join(f"\n    {line}" for line in self._log_lines(name)) + f"\n    (all of it: {self._log_path(name)})"
+        lines = [*self._log_lines(name), f"(whole log: {self._log_path(name)})"]
+        return "".join(f"\n    {line}" for line in lines)
 
     @staticmethod
     def _wait(process: subprocess.Popen[bytes], timeout_s: float) -> bool:
@@ -232,8 +235,8 @@ class Launcher:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    # Ctrl-C reaches every process of the terminal. A child born with this mask does not even see one that comes while
-    # it still imports; this process gets it on another thread or when the mask is lifted.
+    # Ctrl-C reaches every process of the terminal. A child started with this mask does not see one that comes while it
+    # still imports; this process gets it on another thread or when the mask is lifted.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -12,7 +12,7 @@ from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.config import Dataflow, RunConfig, RunSettings, build
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.inline import Inline
-from placegraph.runtime.launch import Launcher, RestartBudget
+from placegraph.runtime.launcher import Launcher, RestartBudget
 from placegraph.runtime.messages import End, Health, Keyframe, LastKeyframe, Message, Pose, Segments
 from placegraph.runtime.messages.codec import encode
 
@@ -134,7 +134,7 @@ def test_ctrl_c_does_not_reach_a_child_that_still_starts(bus_config, tmp_path, w
 
 
 def test_nodes_that_hang_are_killed_together_not_one_after_the_other(bus_config, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("placegraph.runtime.launch.TERMINATE_TIMEOUT_S", 1.5)
+    monkeypatch.setattr("placegraph.runtime.launcher.TERMINATE_TIMEOUT_S", 1.5)
     with Launcher(flow(bus_config, tmp_path), tmp_path) as launcher:
         launcher.start()
         for pid in launcher.pids().values():
@@ -159,7 +159,7 @@ def test_children_end_when_their_launcher_is_killed(tmp_path, wait_until) -> Non
     code = (
         "import sys, time\nfrom pathlib import Path\n"
         "from placegraph.runtime.bus.session import BusConfig, free_endpoint\n"
-        "from placegraph.runtime.config import RunConfig, build\nfrom placegraph.runtime.launch import Launcher\n"
+        "from placegraph.runtime.config import RunConfig, build\nfrom placegraph.runtime.launcher import Launcher\n"
         "nodes = {'camera': {'source': 'flat'}, 'pose': {}}\n"
         "config = RunConfig(bus=BusConfig(endpoint=free_endpoint()), nodes=nodes)\n"
         f"launcher = Launcher(build(config), Path({str(tmp_path)!r}))\nlauncher.start()\n"
