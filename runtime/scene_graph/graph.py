@@ -128,11 +128,7 @@ class SceneGraph:
         return SceneGraph.of(nodes, self.connections.values(), self.route_segments)
 
     def check(self) -> None:
-        """Check the invariants. Raises SchemaError naming what breaks one.
-
-        One building; each parent present and in an allowed layer; boxes ordered and finite; connections and route
-        segments in rooms that exist; widths above 0; no length below the straight line.
-        """
+        """Raise SchemaError unless there is one building, each parent is in an allowed layer, and all values are valid."""
         buildings = [node.id for node in self.nodes.values() if node.layer == "building"]
         if len(buildings) != 1:
             raise SchemaError(f"scene graph: expected one building, found {len(buildings)}")
