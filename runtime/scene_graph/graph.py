@@ -128,7 +128,7 @@ class SceneGraph:
         return SceneGraph.of(nodes, self.connections.values(), self.route_segments)
 
     def check(self) -> None:
-        """Raise SchemaError unless there is one building, each parent is in an allowed layer, and all values are valid."""
+        """Raise SchemaError unless there is one building, every parent is in an allowed layer, and values are valid."""
         buildings = [node.id for node in self.nodes.values() if node.layer == "building"]
         if len(buildings) != 1:
             raise SchemaError(f"scene graph: expected one building, found {len(buildings)}")
