@@ -29,7 +29,7 @@ ONLY_IMPORTERS = {
     "rerun": ("runtime/recording.py", "nodes/recorder/"),
     "onnxruntime": ("models_onnx/session.py", "tools/training/export.py"),
     "kiss_icp": ("nodes/pose/kiss_icp.py",),
-    "llama_cpp": ("runtime/language/grammar_sampling.py", "runtime/language/language_model.py"),
+    "llama_cpp": ("runtime/language/llama_library.py", "runtime/language/language_model.py"),
     "wordllama": ("models_onnx/text_encoder.py",),
     "depthai": ("nodes/camera/oak.py",),
     "onnx": ("tools/training/drawn_scene_network.py", "tools/training/export.py", "tools/training/fold.py"),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from placegraph.runtime import messages as m
 from placegraph.runtime.errors import PlacegraphError, SchemaError
-from placegraph.runtime.language.language_model import LanguageModel, Reply
+from placegraph.runtime.language.language_model import Completion, LanguageModel
 from placegraph.runtime.messages import Message
 from placegraph.runtime.messages.codec import decode, encode
 from placegraph.runtime.node import Context, build_node
@@ -72,12 +72,12 @@ def language_model_replies(replies: dict[str, Any], ask: bool) -> Iterator[None]
             key = json.dumps([name, *arguments, *([named] if named else [])], ensure_ascii=False)
             if ask:
                 found = kept[name](self, *arguments, **named)
-                replies[key] = asdict(found) if isinstance(found, Reply) else found.tolist()
+                replies[key] = asdict(found) if isinstance(found, Completion) else found.tolist()
             elif key not in replies:
                 raise SchemaError(f"the reference holds no reply of the language model to {_short(key)}; {REMAKE}")
             else:
                 self.calls += 1
-            return Reply(**replies[key]) if name == "complete" else np.array(replies[key])
+            return Completion(**replies[key]) if name == "complete" else np.array(replies[key])
 
         return reply
 

@@ -15,10 +15,10 @@ from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.grounding.answer_fields import error_answer, to_json
 from placegraph.nodes.grounding.llm_parser import default_adapter_path
 from placegraph.nodes.grounding.name_matching import Names
-from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, Namer
+from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, PlaceNamer
 from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError
-from placegraph.runtime.language.grammar_options import SAFE
+from placegraph.runtime.language.grammar_options import SAFE_OPTION
 from placegraph.runtime.language.language_model import N_CTX, LanguageModel
 from placegraph.runtime.messages import Answer, Graph, Message, PlaceNames, Question
 from placegraph.runtime.node import Context, Node, NodeConfig
@@ -49,18 +49,18 @@ class Grounding(Node):
     def __init__(self, config: GroundingConfig, context: Context) -> None:
         super().__init__(config, context)
         for setting, types in (("room_types", config.room_types), ("location_types", config.location_types)):
-            wrong = [name for name in types if not SAFE.fullmatch(name)]
-            if wrong or not types:
-                raise ConfigError(f"[nodes.grounding] {setting}: names of letters and digits expected, found {wrong}")
+            unsafe = [name for name in types if not SAFE_OPTION.fullmatch(name)]
+            if unsafe or not types:
+                raise ConfigError(f"[nodes.grounding] {setting}: names of letters and digits expected, found {unsafe}")
         path = Path(config.model_path) if config.model_path else None
         adapter = Path(config.adapter_path) if config.adapter_path else None if path else default_adapter_path()
         self._model = LanguageModel(
             path, adapter_path=adapter, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed
         )
-        encode = TextEncoder().encode
-        self._namer = Namer(self._model, encode, config.room_types, config.location_types)
+        encoder = TextEncoder()
+        self._namer = PlaceNamer(self._model, encoder, config.room_types, config.location_types)
         place_types = (*config.room_types, *config.location_types)
-        names = Names(encode)
+        names = Names(encoder.encode)
         self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model)
         self._graph: SceneGraph | None = None
         self._revision = -1
@@ -86,15 +86,15 @@ class Grounding(Node):
         self._revision = message.revision
         if message.named:
             return []
-        found = self._namer.name_places(self._graph) if self.config.name_places else []
+        place_names = self._namer.name_places(self._graph) if self.config.name_places else []
         names = PlaceNames(
             frame_id=message.frame_id,
             stamp_ns=message.stamp_ns,
             revision=message.revision,
             final=message.final,
-            ids=tuple(name.node_id for name in found),
-            names=tuple(name.name for name in found),
-            weights=np.array([name.weight for name in found], np.float32),
+            ids=tuple(name.node_id for name in place_names),
+            names=tuple(name.name for name in place_names),
+            weights=np.array([name.probability for name in place_names], np.float32),
         )
         return [names]
 

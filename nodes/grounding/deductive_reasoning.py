@@ -23,7 +23,7 @@ from placegraph.nodes.grounding.program_executor import Grounder
 from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.nodes.grounding.rule_parser import check_text
 from placegraph.runtime.language.language_model import LanguageModel
-from placegraph.runtime.language.textualization import plain
+from placegraph.runtime.language.prompts import safe_name
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.scene_graph import Node, id_key
 
@@ -156,20 +156,22 @@ class _Flow:
     def _described(self, node: Node) -> str:
         if node.layer == "object":
             return self._object(node)
-        counted = Counter(name for one in self._contents(node) if (name := plain(one.tags[0].name if one.tags else "")))
+        counted = Counter(
+            name for one in self._contents(node) if (name := safe_name(one.tags[0].name if one.tags else ""))
+        )
         holds = ", ".join(name for name, _ in counted.most_common(MAX_CONTENTS))
         inside = f" in {self._name(self._graph.nodes[node.parent])} {node.parent}" if node.layer == "location" else ""
         return f"{self._name(node)}{inside} ({holds or 'nothing named'})"
 
     def _object(self, node: Node) -> str:
-        names = [name for tag in node.tags[:MAX_TAGS] if (name := plain(tag.name))] or [node.layer]
+        names = [name for tag in node.tags[:MAX_TAGS] if (name := safe_name(tag.name))] or [node.layer]
         color = max(BASIC_COLORS, key=lambda one: color_fit(node, one)) if len(node.color) == 3 else ""
         others = f" or {' or '.join(names[1:])}" if names[1:] else ""
         place = self._name(self._graph.nodes[node.parent])
         return ", ".join(part for part in (names[0] + others, color, f"in {place}") if part)
 
     def _name(self, node: Node) -> str:
-        return plain(node.name, node.layer)
+        return safe_name(node.name, node.layer)
 
     def _ground(self, targets: Sequence[Node], anchors: Sequence[Node]) -> Ranking:
         """The last call, on the small graph of targets and their edges."""

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from placegraph.nodes.grounding.program_executor import Grounder
 from placegraph.nodes.grounding.relations import HOLDS, Case, families
-from placegraph.runtime.language.textualization import plain
+from placegraph.runtime.language.prompts import safe_name
 from placegraph.runtime.scene_graph import Node
 from placegraph.runtime.vision.geometry import box_distance_m
 
@@ -32,7 +32,7 @@ def edges(grounder: Grounder, target: Node, anchors: Sequence[Node], most: int) 
 def _edge(grounder: Grounder, target: Node, anchor: Node, gap_m: float) -> str:
     graph = grounder.graph
     apart = ", in another room" if graph.room_of(target.id) != graph.room_of(anchor.id) else ""
-    name = f"{plain(anchor.name, anchor.layer)} {anchor.id}"
+    name = f"{safe_name(anchor.name, anchor.layer)} {anchor.id}"
     fits = {relation: _fit(grounder, relation, target, anchor) for relation in SEMANTIC}
     how = [one for one in SEMANTIC if fits[one] >= HOLDS and fits[one] > fits.get(OPPOSITE.get(one, ""), 0.0) + MARGIN]
     words = [WORDS.get(one, one) for one in how if one != "in" or "on" not in how]  # "in" holds for what lies on, too

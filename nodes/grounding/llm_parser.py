@@ -13,7 +13,8 @@ from pathlib import Path
 from placegraph.nodes.grounding.program import SAME_KIND, Thing
 from placegraph.nodes.grounding.program_syntax import grammar, read
 from placegraph.runtime.errors import ModelError, QueryError
-from placegraph.runtime.language.language_model import LanguageModel, ReplyCut, prompt
+from placegraph.runtime.language.language_model import CompletionTruncated, LanguageModel
+from placegraph.runtime.language.prompts import fill_prompt
 from placegraph.runtime.language.word_forms import tokens
 
 ADAPTER_FILE = "reader.gguf"
@@ -63,7 +64,7 @@ def read_request(model: LanguageModel, text: str, *, adapted: bool = True) -> Re
 
 def read_by_examples(model: LanguageModel, text: str) -> Reading:
     """The same by the model as it comes, with examples in the prompt instead of an adapter. Raises QueryError."""
-    return _read(model, text, prompt(__package__, "read") + "\n", adapted=False)
+    return _read(model, text, fill_prompt(__package__, "read") + "\n", adapted=False)
 
 
 def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Reading:
@@ -71,8 +72,8 @@ def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Readi
     if words > MAX_WORDS:
         raise QueryError(f"the request has {words} words and marks; at most {MAX_WORDS} are read")
     try:
-        said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
-    except ReplyCut:
+        said = model.complete(asked(text), grammar(text), REPLY_TOKENS, prefix=opening, use_adapter=adapted)
+    except CompletionTruncated:
         return Reading(None, 0.0)
     return Reading(with_noun(read(said.text)), math.exp(said.log_probability))
 

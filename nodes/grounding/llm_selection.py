@@ -16,7 +16,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.grammar_options import enum_rule
-from placegraph.runtime.language.language_model import LanguageModel, prompt
+from placegraph.runtime.language.language_model import LanguageModel
+from placegraph.runtime.language.prompts import fill_prompt
 from placegraph.runtime.language.word_forms import tokens
 
 MAX_REASON = 120  # departs: letters of a reason; a model that does not come to a point must not fill the context
@@ -92,15 +93,15 @@ class Dialogue:
     def _parts(self, step: str) -> tuple[str, str, str]:
         """Opening with the examples, what is asked with its fields open, and closing of a prompt."""
         if step not in self._marks:
-            examples, asked = prompt(__package__, step, question=self._question).split("|", 1)
-            opening, closing = self._model.dialogue(examples)
+            examples, asked = fill_prompt(__package__, step, question=self._question).split("|", 1)
+            opening, closing = self._model.apply_chat_template(examples)
             self._marks[step] = opening, asked, closing
         return self._marks[step]
 
     def _ask(self, step: str, entries: Sequence[Entry], grammar: str, longest: int) -> str:
         """The only place where this mode calls the model."""
         opening, middle, closing = self._parts(step)
-        reply = self._model.complete(_filled(middle, entries), grammar, longest, opening=opening, closing=closing)
+        reply = self._model.complete(_filled(middle, entries), grammar, longest, prefix=opening, suffix=closing)
         return reply.text
 
     def _pages(self, step: str, entries: Sequence[Entry], longest: int) -> list[list[Entry]]:

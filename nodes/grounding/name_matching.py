@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from placegraph.runtime.arrays import F32
-from placegraph.runtime.language.word_forms import kinds, normal_form, synonyms
+from placegraph.runtime.language.word_forms import hyponyms, normal_form, synonyms
 from placegraph.runtime.scene_graph import ID_PATTERN, Node
 
 Encode = Callable[[Sequence[str]], F32]  # texts to (N, D) unit rows; a zero row for an empty text
@@ -147,7 +147,7 @@ def _by_words(noun: str, tag: str) -> float:
         return KIND  # an office chair is a chair
     if _are_synonyms(noun, tag):
         return SYNONYM + SHARED * noun.endswith(f" {tag}")  # of a duffel bag: a bag before a backpack
-    if tag in kinds().get(noun, ()):
+    if tag in hyponyms().get(noun, ()):
         return MEMBER  # a chair is a seat
     if is_slip(noun, tag):
         return SLIP
@@ -162,7 +162,7 @@ def _by_words(noun: str, tag: str) -> float:
             if _are_synonyms(own, other) or (own == other and own != noun and other != tag):
                 # "leather couch" and "green sofa"; the words before the heads may speak against each other
                 found = max(found, worth * (SYNONYM if own != other else 0.9))
-            elif other in kinds().get(own, ()):
+            elif other in hyponyms().get(own, ()):
                 found = max(found, worth * MEMBER)
             elif is_slip(own, other):
                 found = max(found, worth * SLIP)
@@ -189,7 +189,7 @@ def is_slip(noun: str, word: str) -> bool:
     most = 0 if shorter < SLIP_LETTERS[0] else 1 if shorter < SLIP_LETTERS[1] else 2
     if not most or abs(len(noun) - len(word)) > most or noun[0] != word[0]:
         return False
-    if noun in synonyms() or noun in kinds():
+    if noun in synonyms() or noun in hyponyms():
         return False  # a word of its own: a desk is no dusk
     return _edits(noun, word) <= most
 

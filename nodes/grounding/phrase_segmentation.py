@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 
 from placegraph.nodes.grounding.attributes import COLORS
 from placegraph.nodes.grounding.relations import triggers
-from placegraph.runtime.language.word_forms import is_plural, normal_form, singular, tokens, words_of
+from placegraph.runtime.language.word_forms import is_plural, normal_form, singular, tokens, word_list
 
-FILLER = words_of("filler.txt")
+FILLER = word_list("filler.txt")
 ANYTHING = frozenset(
     (
         "thing",

@@ -1,9 +1,10 @@
-"""What a thing tells of the kind of place it stands in, in nats for each kind.
+"""Evidence weights: how strongly an object of some name speaks for each type of room or location, in nats.
 
-Known things and kinds come from a table written by hand (places.txt), a thing that it does not hold from those that are
-called most alike and the language model's opinion together, a kind that it does not hold from the model alone.
-Measured by leaving one of the 159 things that tell most of rooms out of the table at a time: the right kind first for
-71 % by both together, 60 % by the model and 52 % by word vectors alone.
+Known objects and types come from a table written by hand (place_evidence.txt). For an object that the table lacks, the
+weights of the objects with the most similar names and the language model's log-probabilities are averaged; a type that
+the table lacks goes by the language model alone. Measured by leaving one of the 159 objects with the strongest evidence
+for rooms out of the table at a time: the right type came first for 71 % by both together, 60 % by the model and 52 % by
+word vectors alone.
 """
 
 from __future__ import annotations
@@ -14,113 +15,119 @@ from importlib import resources
 
 import numpy as np
 
-from placegraph.nodes.grounding.name_matching import Encode
+from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form, synonyms
 
-Opinion = Callable[[str], F64]  # a thing to the model's log-probability of each kind of place, (N,)
+TypeLogProbabilities = Callable[[str], F64]  # an object's name to the model's log-probability of each type, (N,) nats
+TableLine = tuple[tuple[str, ...], ...]  # names of objects in groups: decisive, typical, common
 
-STRENGTHS = (3.0, 2.0, 1.0)  # departs: nats of what settles a place, is typical of it, is often there
+GROUP_WEIGHTS = (3.0, 2.0, 1.0)  # nats for decisive, typical and common objects; chosen by hand
 ANYWHERE = "anywhere"
-ALIKE = 5  # departs: things of the table whose names are nearest
-# What a kind scores on average over these, by the model, is what it scores for nothing. One or two common things of
-# every kind of room, so that no kind is favoured by the list itself.
-REFERENCE = (
+NEAREST_OBJECTS = 5  # of the table, by the cosine of their names, that estimate an unknown one; chosen by hand
+# The model's log-probability of a type, averaged over these, is what that type scores without any evidence. One or two
+# common objects of every type of room, so that the list itself favours no type.
+REFERENCE_OBJECTS = (
     "bed", "wardrobe", "sofa", "television", "fridge", "stove", "toilet", "towel", "desk", "printer", "car", "bicycle",
     "box", "washing machine", "coat", "door", "plate", "chair", "lamp", "window",
 )  # fmt: skip
-MIN_SPREAD = 0.1  # nats; a single kind, or kinds that all things fit alike, must not divide by nothing
+MIN_STD = 0.1  # nats; avoids a division by zero where the reference objects all score a type alike
 
 
-class Telling:
-    """What things tell of the kinds of place of one layer; each thing is looked up once."""
+class PlaceEvidence:
+    """Evidence weights of objects for the place types of one layer; each object's name is looked up once."""
 
-    def __init__(self, layer: str, kinds: Sequence[str], encode: Encode, opinion: Opinion) -> None:
-        """layer: room or location; kinds: N names of places, those of the table and others."""
-        lines = _table()[layer]
-        found = [_line_of(kind, lines) for kind in kinds]
-        self._encode, self._opinion = encode, opinion
-        self._unknown = np.array([line is None for line in found], bool)  # (N,) kinds by the model alone
-        self.is_settled = np.array([bool(line and lines[line][0]) for line in found], bool)  # (N,) something settles it
-        self.is_bare = np.array([line is not None and line.endswith("*") for line in found], bool)  # (N,)
-        # what the table holds for another layer alone tells nothing of this one
-        listed = [
-            tag for places in _table().values() for groups in places.values() for group in groups for tag in group
-        ]
-        self._rows: dict[str, F64] = {tag: np.zeros(len(kinds)) for tag in listed}
-        for i, line in enumerate(found):
-            for strength, group in zip(STRENGTHS, lines[line] if line else (), strict=False):
+    def __init__(
+        self, layer: str, place_types: Sequence[str], encoder: TextEncoder, log_probabilities: TypeLogProbabilities
+    ) -> None:
+        """layer: room or location. place_types: N names, those of the table and others."""
+        table = _table()[layer]
+        table_names = [_table_name(place_type, table) for place_type in place_types]
+        self._encoder, self._log_probabilities = encoder, log_probabilities
+        self._not_in_table = np.array([name is None for name in table_names], bool)  # (N,)
+        # (N,) whether there are decisive objects for the type, and whether it is that of places without evidence
+        self.has_decisive = np.array([bool(name and table[name][0]) for name in table_names], bool)
+        self.is_default = np.array([bool(name and name.endswith("*")) for name in table_names], bool)
+        # objects that the table lists for the other layer alone are no evidence in this one
+        listed = {tag for lines in _table().values() for groups in lines.values() for group in groups for tag in group}
+        self._rows: dict[str, F64] = {tag: np.zeros(len(place_types)) for tag in listed}
+        for i, name in enumerate(table_names):
+            for weight, group in zip(GROUP_WEIGHTS, table[name] if name else (), strict=False):
                 for tag in group:
-                    row = self._rows.setdefault(tag, np.zeros(len(kinds)))
-                    row[i] = max(row[i], strength)
-        self._listed = sorted(tag for tag, row in self._rows.items() if row.any())
-        self._found: dict[str, F64] = {}
-        self._usual: tuple[F64, F64] | None = None
+                    self._rows[tag][i] = max(self._rows[tag][i], weight)
+        self._informative = sorted(tag for tag, row in self._rows.items() if row.any())
+        self._cache: dict[str, F64] = {}
+        self._reference: tuple[F64, F64] | None = None  # (N,) mean and standard deviation over REFERENCE_OBJECTS
 
-    def row(self, tag: str) -> F64:
-        """Nats (N,) that a thing of this name tells for each kind, 0: nothing."""
-        if tag not in self._found:
-            listed = self._listed_as(tag)
-            is_told = listed and (listed in _anywhere() or not self._unknown.any())
-            self._found[tag] = self._rows[listed] if is_told else self._estimated(tag, listed)
-        return self._found[tag]
+    def weights(self, tag: str) -> F64:
+        """Nats (N,) by which an object of this name speaks for each type; 0: it says nothing."""
+        if tag not in self._cache:
+            listed = self._listed_name(tag)
+            in_table = listed and (listed in _uninformative() or not self._not_in_table.any())
+            self._cache[tag] = self._rows[listed] if in_table else self._estimated(tag, listed)
+        return self._cache[tag]
 
-    def _listed_as(self, tag: str) -> str:
-        """The name under which the table holds a thing: its own, a synonym's, or its kind's; "": it does not."""
+    def _listed_name(self, tag: str) -> str:
+        """The name under which the table lists an object: its own, a synonym, its head noun; "": the table lacks it."""
         tag = normal_form(tag)
         if tag in self._rows:
             return tag
-        others = sorted(synonyms().get(tag, frozenset()) & self._rows.keys())
+        alternatives = sorted(synonyms().get(tag, frozenset()) & self._rows.keys())
         words = tag.split()
-        ends = [end for i in range(1, len(words)) if (end := " ".join(words[i:])) in self._rows]
-        return next(iter([*others, *ends]), "")
+        head_nouns = [head for i in range(1, len(words)) if (head := " ".join(words[i:])) in self._rows]
+        return next(iter([*alternatives, *head_nouns]), "")
 
     def _estimated(self, tag: str, listed: str) -> F64:
-        opinion = self._thought(tag)
-        known = self._rows[listed] if listed else np.clip((self._alike(tag) + opinion) / 2, 0, STRENGTHS[1])
-        return np.where(self._unknown, np.clip(opinion, 0, STRENGTHS[1]), known)
+        by_model = self._model_weights(tag)
+        if listed:
+            known = self._rows[listed]
+        else:
+            known = np.clip((self._similar_names_weights(tag) + by_model) / 2, 0, GROUP_WEIGHTS[1])
+        return np.where(self._not_in_table, np.clip(by_model, 0, GROUP_WEIGHTS[1]), known)
 
-    def _alike(self, tag: str) -> F64:
-        """What the things called most like this one tell, on average, the nearest most."""
-        cosines = self._encode(self._listed).astype(np.float64) @ self._encode([tag])[0].astype(np.float64)
-        nearest = np.argsort(-cosines, kind="stable")[:ALIKE]
-        weights = np.clip(cosines[nearest], 0, None) ** 2 + 1e-9
-        rows = np.array([self._rows[self._listed[i]] for i in nearest])
-        return np.asarray(weights @ rows / weights.sum())
+    def _similar_names_weights(self, tag: str) -> F64:
+        """The average weights (N,) of the objects with the most similar names, by the squares of their cosines."""
+        vectors = self._encoder.encode(self._informative).astype(np.float64)
+        cosines = vectors @ self._encoder.encode([tag])[0].astype(np.float64)
+        nearest = np.argsort(-cosines, kind="stable")[:NEAREST_OBJECTS]
+        shares = np.clip(cosines[nearest], 0, None) ** 2 + 1e-9
+        rows = np.array([self._rows[self._informative[i]] for i in nearest])
+        return np.asarray(shares @ rows / shares.sum())
 
-    def _thought(self, tag: str) -> F64:
-        """The model's log-probabilities (N,) for a thing, by how far each lies above what the kind usually gets."""
-        if self._usual is None:
-            common = np.array([self._opinion(thing) for thing in REFERENCE])
-            self._usual = common.mean(axis=0), np.maximum(common.std(axis=0), MIN_SPREAD)
-        mean, spread = self._usual
-        return np.asarray((self._opinion(tag) - mean) / spread)
+    def _model_weights(self, tag: str) -> F64:
+        """The model's log-probabilities (N,), in standard deviations above those of the reference objects."""
+        if self._reference is None:
+            values = np.array([self._log_probabilities(name) for name in REFERENCE_OBJECTS])
+            self._reference = values.mean(axis=0), np.maximum(values.std(axis=0), MIN_STD)
+        mean, std = self._reference
+        return np.asarray((self._log_probabilities(tag) - mean) / std)
 
 
-def _line_of(kind: str, lines: dict[str, tuple[tuple[str, ...], ...]]) -> str | None:
-    """The line of the table for a kind of place, by its name or a synonym's; None: there is none."""
-    names = {normal_form(line.rstrip("*")): line for line in lines}
-    said = normal_form(kind)
-    return names.get(said) or next((names[one] for one in sorted(synonyms().get(said, ())) if one in names), None)
+def _table_name(place_type: str, table: dict[str, TableLine]) -> str | None:
+    """The table's name for a place type, also by a synonym; None: the table lacks it."""
+    names = {normal_form(name.rstrip("*")): name for name in table}
+    place_type = normal_form(place_type)
+    candidates = [place_type, *sorted(synonyms().get(place_type, ()))]
+    return next((names[name] for name in candidates if name in names), None)
 
 
 @cache
-def _anywhere() -> frozenset[str]:
-    """Things that tell nothing of any place."""
+def _uninformative() -> frozenset[str]:
+    """Objects that are evidence for no place."""
     return frozenset(_table()[ANYWHERE][ANYWHERE][0])
 
 
 @cache
-def _table() -> dict[str, dict[str, tuple[tuple[str, ...], ...]]]:
-    """Groups of things by kind of place and layer, strongest first, as places.txt lists them."""
-    found: dict[str, dict[str, tuple[tuple[str, ...], ...]]] = {}
+def _table() -> dict[str, dict[str, TableLine]]:
+    """The lines of place_evidence.txt by layer and place type."""
+    table: dict[str, dict[str, TableLine]] = {}
     layer = ""
-    for line in resources.files(__package__).joinpath("places.txt").read_text(encoding="utf-8").splitlines():
+    for line in resources.files(__package__).joinpath("place_evidence.txt").read_text(encoding="utf-8").splitlines():
         if line.startswith("["):
             layer = line.strip("[]")
-            found[layer] = {}
+            table[layer] = {}
         elif line and not line.startswith("#"):
-            place, _, things = line.rpartition(":")
-            groups = (tuple(filter(None, map(normal_form, group.split(",")))) for group in things.split("|"))
-            found[layer][place or ANYWHERE] = tuple(groups)
-    return found
+            place_type, _, objects = line.rpartition(":")
+            groups = (tuple(filter(None, map(normal_form, group.split(",")))) for group in objects.split("|"))
+            table[layer][place_type or ANYWHERE] = tuple(groups)
+    return table

@@ -1,10 +1,11 @@
-"""Names of rooms and locations from what they contain: a pure function of the tags of their objects.
+"""Names of rooms and locations from the tags of the objects in them.
 
-Source: paper, "Room Layer" and "Location Layer". Departs: the paper asks a large language model with the list of tags,
-of which a strong one names 28 % of rooms right (METHOD section 6). Here each thing tells what telling.py knows of it,
-things that tell of one kind of place count less and less (a desk, a chair and a monitor are one work corner), and a
-place keeps a distribution, not one name. Measured on maps of five houses built from frames: 48 of 54 rooms and 66 of
-75 locations named right, by SmolLM2-135M's opinion of each thing alone 21 and 41 (of fewer types of location).
+Source: paper, "Room Layer" and "Location Layer". Not as in the paper: there a large language model is asked with the
+list of tags, by which a strong one names 28 % of rooms right (HOV-SG's own experiment). Here the evidence of the
+objects is added up in the manner of naive Bayes, except that further objects for the same type count less and less (a
+desk, a chair and a monitor are one work corner), and a place keeps a distribution over types, not one name. Measured on
+maps of five houses built from frames: 48 of 54 rooms and 66 of 75 locations named right; by SmolLM2-135M's
+log-probabilities for each object alone 21 and 41 (of fewer types of location).
 """
 
 from __future__ import annotations
@@ -15,29 +16,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.nodes.grounding.name_matching import Encode
-from placegraph.nodes.grounding.place_evidence import STRENGTHS, Opinion, Telling
+from placegraph.models_onnx.text_encoder import TextEncoder
+from placegraph.nodes.grounding.place_evidence import GROUP_WEIGHTS, PlaceEvidence, TypeLogProbabilities
 from placegraph.runtime.arrays import F64
-from placegraph.runtime.language.language_model import LanguageModel, prompt
+from placegraph.runtime.language.language_model import LanguageModel
+from placegraph.runtime.language.prompts import fill_prompt
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
+# the types that HM3DSem and ScanNet annotate most in homes
 ROOM_TYPES = (
     "bathroom", "bedroom", "dining room", "garage", "hallway", "kitchen", "laundry room", "living room", "office",
     "playroom", "storage room",
-)  # fmt: skip  # departs: the types that HM3DSem and ScanNet annotate most in homes
+)  # fmt: skip
+# chosen by hand after the paper's examples ("bed with bedside tables", "kitchen area")
 LOCATION_TYPES = (
     "bathing area", "cooking area", "dining area", "entrance area", "laundry area", "media area", "music area",
     "play area", "reading area", "sitting area", "sleeping area", "storage area", "washing area", "work area",
-)  # fmt: skip  # departs: what the paper's examples ("bed with bedside tables", "kitchen area") come down to
-KEPT = 3
-# departs: chosen on furnished houses of other seeds with 40 % of the objects missing and 10 % misnamed; half or twice
-# of any of them changes less than 3 % of the names
-REPEATED = 0.5  # each further thing that tells of the same kind of place counts so much less
-MISSED = 1.5  # nats against a kind of place of which nothing typical is there
-BARE = 1.0  # nats for the kind of place that a room is when nothing tells
+)  # fmt: skip
+MAX_NAMES = 3  # kept for each place
+# Chosen on furnished houses of other seeds with 40 % of the objects missing and 10 % misnamed; half or twice of any of
+# the three changes less than 3 % of the names.
+REPEATED_EVIDENCE = 0.5  # each further object that speaks for the same type counts this share of the one before
+ABSENCE_PENALTY = 1.5  # nats against a type that has decisive objects while the place holds no typical one
+DEFAULT_TYPE_WEIGHT = 1.0  # nats for the type of a place without evidence
 
-Evidence = tuple[tuple[str, int], ...]  # sorted (tag, count)
+TagCounts = tuple[tuple[str, int], ...]  # sorted (tag, count)
 
 
 @dataclass(frozen=True)
@@ -46,50 +50,51 @@ class PlaceName:
 
     node_id: str
     name: str
-    weight: float
+    probability: float
 
 
-class Namer:
-    """Names places; the same evidence gives the same names. The model is asked for what the table does not hold."""
+class PlaceNamer:
+    """Names places; the same objects give the same names. The model is asked only for what the table lacks."""
 
     def __init__(
-        self, model: LanguageModel, encode: Encode, room_types: Sequence[str], location_types: Sequence[str]
+        self, model: LanguageModel, encoder: TextEncoder, room_types: Sequence[str], location_types: Sequence[str]
     ) -> None:
         self._model = model
         self._types = {"room": tuple(room_types), "location": tuple(location_types)}
-        self._telling = {
-            layer: Telling(layer, types, encode, self._asks(layer)) for layer, types in self._types.items()
+        self._evidence = {
+            layer: PlaceEvidence(layer, types, encoder, self._model_opinion(layer))
+            for layer, types in self._types.items()
         }
 
     def name_places(self, graph: SceneGraph) -> list[PlaceName]:
-        """Names of each room and location that holds something named, best first, in the order of their ids."""
-        found = []
-        for layer in ("room", "location"):
-            for place in graph.layer(layer):
-                evidence = evidence_of(graph, place)
-                if evidence:
-                    found += [PlaceName(place.id, name, weight) for name, weight in self.names(layer, evidence)]
-        return found
+        """Names of each room and location that holds a named object, best first, in the order of their ids."""
+        return [
+            PlaceName(place.id, name, probability)
+            for layer in ("room", "location")
+            for place in graph.layer(layer)
+            if (objects := tag_counts(graph, place))
+            for name, probability in self.names(layer, objects)
+        ]
 
-    def names(self, layer: str, evidence: Evidence) -> tuple[tuple[str, float], ...]:
-        """Name and probability, best first, for a room or location that holds this."""
-        types, telling = self._types[layer], self._telling[layer]
-        # how many there are of a thing says little: a room with six chairs is no more a dining room than one with four
-        told = -np.sort([-telling.row(tag) for tag, _ in evidence], axis=0)
-        scores = REPEATED ** np.arange(len(told)) @ told + BARE * telling.is_bare
-        scores -= MISSED * (telling.is_settled & (told[0] < STRENGTHS[1]))
-        order = np.argsort(-scores, kind="stable")[:KEPT]
-        shares = _softmax(scores[order])
-        return tuple((types[i], float(share)) for i, share in zip(order, shares, strict=True))
+    def names(self, layer: str, objects: TagCounts) -> tuple[tuple[str, float], ...]:
+        """Names with their probabilities, best first, for a room or location that holds these objects."""
+        types, evidence = self._types[layer], self._evidence[layer]
+        # Counts are ignored: a room with six chairs is no more a dining room than one with four. (K, N), best first.
+        weights = -np.sort([-evidence.weights(tag) for tag, _ in objects], axis=0)
+        scores = REPEATED_EVIDENCE ** np.arange(len(weights)) @ weights + DEFAULT_TYPE_WEIGHT * evidence.is_default
+        scores -= ABSENCE_PENALTY * (evidence.has_decisive & (weights[0] < GROUP_WEIGHTS[1]))
+        order = np.argsort(-scores, kind="stable")[:MAX_NAMES]
+        probabilities = _softmax(scores[order])
+        return tuple((types[i], float(probability)) for i, probability in zip(order, probabilities, strict=True))
 
-    def _asks(self, layer: str) -> Opinion:
-        """The model's log-probability of each type of place for one thing."""
+    def _model_opinion(self, layer: str) -> TypeLogProbabilities:
+        """The model's log-probabilities of the layer's types for one object."""
 
-        def opinion(thing: str) -> F64:
-            opening, rest = prompt(__package__, layer, thing=thing).split("|", 1)
-            return self._model.log_probabilities(opening, rest, [f" {name}" for name in self._types[layer]])
+        def log_probabilities(name: str) -> F64:
+            prefix, text = fill_prompt(__package__, layer, thing=name).split("|", 1)
+            return self._model.log_probabilities(prefix, text, [f" {place_type}" for place_type in self._types[layer]])
 
-        return opinion
+        return log_probabilities
 
 
 def _softmax(values: F64) -> F64:
@@ -97,8 +102,8 @@ def _softmax(values: F64) -> F64:
     return np.asarray(powers / powers.sum())
 
 
-def evidence_of(graph: SceneGraph, place: Node) -> Evidence:
-    """Strongest tags of the objects in a place with how many carry them, sorted; empty: nothing there has a name."""
+def tag_counts(graph: SceneGraph, place: Node) -> TagCounts:
+    """How many objects in a place bear each name (their strongest tag), sorted; empty: no object there has a name."""
     below = [node for child in graph.children(place.id) for node in (child, *graph.children(child.id))]
     objects = [node for node in below if node.layer == "object"]
     counts = Counter(normal_form(node.tags[0].name) for node in objects if node.tags)

@@ -23,7 +23,8 @@ from placegraph.nodes.grounding.ranking import Ranking
 from placegraph.nodes.grounding.rule_parser import check_text, draft
 from placegraph.nodes.grounding.search_scope import Scope, places_called
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.language.language_model import LanguageModel, prompt
+from placegraph.runtime.language.language_model import LanguageModel
+from placegraph.runtime.language.prompts import fill_prompt
 from placegraph.runtime.language.word_forms import normal_form, tokens
 from placegraph.runtime.messages import Question
 from placegraph.runtime.query.request import MODES
@@ -193,8 +194,8 @@ class Reasoner:
             near = self._names.nearest(purpose, scope.objects, MAX_OPTIONS)
             names = sorted({normal_form(name) for name in near})
         options = [f" {name}" for name in names]
-        opening, said = prompt(__package__, "purpose", purpose=purpose).split("|", 1)
-        neutral = prompt(__package__, "purpose", purpose="something").split("|", 1)[1]
+        opening, said = fill_prompt(__package__, "purpose", purpose=purpose).split("|", 1)
+        neutral = fill_prompt(__package__, "purpose", purpose="something").split("|", 1)[1]
         # minus what each name scores when nothing is said: common words would win otherwise
         prior = self._model.log_probabilities(opening, neutral, options)
         scores = self._model.log_probabilities(opening, said, options) - prior

@@ -1,1 +1,1 @@
-"""The local language model and the words that nodes share: prompts, grammars, word forms, synonyms."""
+"""Language that several nodes share: the language model, its prompts and grammars, word forms and synonyms."""

@@ -8,7 +8,7 @@ from functools import cache
 from importlib import resources
 
 TOKEN = re.compile(r"[a-z0-9]+(?:['-][a-z0-9]+)*|[,.;:?!]")
-IRREGULAR = {
+IRREGULAR_SINGULARS = {
     "shelves": "shelf",
     "bookshelves": "bookshelf",
     "knives": "knife",
@@ -24,12 +24,12 @@ IRREGULAR = {
     "gas": "gas",
     "series": "series",
 }
-KEEP_S = ("ss", "us", "is", "as")  # glass, cactus, chassis, canvas are singular already
-TAKES_ES = ("shes", "ches", "xes", "sses", "zes")  # dishes, benches, boxes, glasses
+SINGULAR_ENDINGS = ("ss", "us", "is", "as")  # glass, cactus, chassis, canvas are singular already
+ES_PLURALS = ("shes", "ches", "xes", "sses", "zes")  # dishes, benches, boxes, glasses
 
 
 def tokens(text: str) -> tuple[str, ...]:
-    """Lower-case words of ASCII letters, digits, ' and -, and punctuation marks, in order; other script is left out."""
+    """Lower-case words of ASCII letters, digits, ' and -, and punctuation marks, in order; the rest is dropped."""
     plain = unicodedata.normalize("NFKD", text.replace("\u2019", "'")).lower()
     plain = "".join(mark for mark in plain if not unicodedata.combining(mark))
     return tuple(word.removesuffix("'s") for word in TOKEN.findall(plain))
@@ -37,19 +37,19 @@ def tokens(text: str) -> tuple[str, ...]:
 
 @cache
 def singular(word: str) -> str:
-    """The singular of an English noun by its ending; a word that is no plural comes back as it is."""
-    if word in IRREGULAR:
-        return IRREGULAR[word]
-    if len(word) < 4 or not word.endswith("s") or word.endswith(KEEP_S):
+    """The singular of an English noun by its ending; other words are returned unchanged."""
+    if word in IRREGULAR_SINGULARS:
+        return IRREGULAR_SINGULARS[word]
+    if len(word) < 4 or not word.endswith("s") or word.endswith(SINGULAR_ENDINGS):
         return word
     if word.endswith("ies"):
         return word[:-3] + "y"
-    return word[:-2] if word.endswith(TAKES_ES) else word[:-1]
+    return word[:-2] if word.endswith(ES_PLURALS) else word[:-1]
 
 
 @cache
 def normal_form(phrase: str) -> str:
-    """A noun phrase as it is compared: words joined by spaces, the last one singular."""
+    """The form in which noun phrases are compared: lower-case words joined by spaces, the last one singular."""
     words = [word for word in tokens(phrase.replace("-", " ").replace("_", " ")) if word[0].isalnum()]
     return " ".join([*words[:-1], singular(words[-1])]) if words else ""
 
@@ -60,9 +60,33 @@ def is_plural(phrase: str) -> bool:
     return singular(last) != last
 
 
-def words_of(file: str) -> frozenset[str]:
-    """The words of a text file of this package; lines that start with # are remarks."""
+def word_list(file: str) -> frozenset[str]:
+    """The words of a text file of this package; lines that start with # are comments."""
     return frozenset(word for line in _lines(file) for word in line.split())
+
+
+@cache
+def synonyms() -> dict[str, frozenset[str]]:
+    """Names of the same kind of thing, by normal form, with and without the spaces of compounds (synonyms.txt)."""
+    groups: dict[str, frozenset[str]] = {}
+    for line in _lines("synonyms.txt"):
+        if ":" not in line:
+            group = _spellings(line)
+            for name in group:
+                groups[name] = groups.get(name, frozenset()) | group
+    return groups
+
+
+@cache
+def hyponyms() -> dict[str, frozenset[str]]:
+    """Narrower names that a wider word may stand for, by normal form of the wider word (synonyms.txt)."""
+    groups: dict[str, frozenset[str]] = {}
+    for line in _lines("synonyms.txt"):
+        if ":" in line:
+            wider, narrower = line.split(":")
+            for name in _spellings(wider):
+                groups[name] = groups.get(name, frozenset()) | _spellings(narrower)
+    return groups
 
 
 def _lines(file: str) -> list[str]:
@@ -70,35 +94,7 @@ def _lines(file: str) -> list[str]:
     return [line for line in text.splitlines() if line and not line.startswith("#")]
 
 
-@cache
-def synonyms() -> dict[str, frozenset[str]]:
-    """Names of the same kind of thing, by normal form, with and without the spaces of compounds.
-
-    Read from synonyms.txt: one set a line, separated by commas.
-    """
-    found: dict[str, frozenset[str]] = {}
-    for line in _lines("synonyms.txt"):
-        if ":" in line:
-            continue
-        group = frozenset(form for name in line.split(",") for form in _forms(name))
-        for name in group:
-            found[name] = found.get(name, frozenset()) | group
-    return found
-
-
-@cache
-def kinds() -> dict[str, frozenset[str]]:
-    """What a wider word may stand for, by normal form; the lines `wider: one, other` of synonyms.txt."""
-    found: dict[str, frozenset[str]] = {}
-    for line in _lines("synonyms.txt"):
-        if ":" in line:
-            wider, members = line.split(":")
-            group = frozenset(form for name in members.split(",") for form in _forms(name))
-            for name in _forms(wider):
-                found[name] = found.get(name, frozenset()) | group
-    return found
-
-
-def _forms(name: str) -> tuple[str, str]:
-    whole = normal_form(name)
-    return whole, whole.replace(" ", "")
+def _spellings(names: str) -> frozenset[str]:
+    """Normal forms of names that commas separate, each also without its spaces."""
+    forms = [normal_form(name) for name in names.split(",")]
+    return frozenset(forms) | {form.replace(" ", "") for form in forms}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.language.language_model import LanguageModel, Reply
+from placegraph.runtime.language.language_model import Completion, LanguageModel
 from placegraph.runtime.messages import Answer, Frame, Graph, Keyframe, Pose
 from placegraph.tools.recorded_steps import (
     Reference,
@@ -165,23 +165,25 @@ def test_json_is_compared_node_by_node() -> None:
 def test_replies_are_kept_and_given_without_a_model(monkeypatch) -> None:
     asked = []
 
-    def complete(self: LanguageModel, text: str, grammar: str, max_tokens: int, adapted: bool = False) -> Reply:
+    def complete(
+        self: LanguageModel, text: str, grammar: str, max_tokens: int, use_adapter: bool = False
+    ) -> Completion:
         asked.append(text)
-        return Reply(text.upper(), -1.5 if adapted else 0.0)
+        return Completion(text.upper(), -1.5 if use_adapter else 0.0)
 
     monkeypatch.setattr(LanguageModel, "complete", complete)
     monkeypatch.setattr(LanguageModel, "log_probabilities", lambda self, a, b, options: np.arange(len(options)) - 0.5)
     replies: dict[str, Any] = {}
     with language_model_replies(replies, ask=True):
-        assert LanguageModel().complete("a", "g", 3) == Reply("A", 0.0)
-        assert LanguageModel().complete("a", "g", 3, adapted=True) == Reply("A", -1.5)
+        assert LanguageModel().complete("a", "g", 3) == Completion("A", 0.0)
+        assert LanguageModel().complete("a", "g", 3, use_adapter=True) == Completion("A", -1.5)
         LanguageModel().log_probabilities("o", "t", [" x", " y"])
     assert json.loads(json.dumps(replies)) == replies  # nothing but what a file can hold
     with language_model_replies(replies, ask=False):
         model = LanguageModel(Path("no such file"))
         model.load()
-        assert model.complete("a", "g", 3) == Reply("A", 0.0)
-        assert model.complete("a", "g", 3, adapted=True) == Reply("A", -1.5)
+        assert model.complete("a", "g", 3) == Completion("A", 0.0)
+        assert model.complete("a", "g", 3, use_adapter=True) == Completion("A", -1.5)
         np.testing.assert_array_equal(model.log_probabilities("o", "t", [" x", " y"]), [-0.5, 0.5])
         assert (model.calls, asked) == (3, ["a", "a"])
         with pytest.raises(SchemaError, match=r'no reply of the language model to .*"b.*--update'):

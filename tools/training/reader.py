@@ -36,8 +36,8 @@ class Sentences:
         self.tokens: list[list[int]] = []
         self.targets: list[list[int]] = []
         for request in requests:
-            target = model.encode_reply(reply(request.program))
-            self.tokens.append(model.encode(asked(request.text), OPENING) + target[:-1])
+            target = model.tokenize_completion(reply(request.program))
+            self.tokens.append(model.tokenize_prompt(asked(request.text), OPENING) + target[:-1])
             self.targets.append(target)
 
     def logits(self, network: nn.Module) -> tuple[Tensor, Tensor]:

@@ -14,9 +14,9 @@ NOWHERE = np.full(3, np.nan)
 class Careful(LanguageModel):
     """The packaged model; every call is checked to fit the context."""
 
-    def complete(self, text, grammar, max_tokens, opening="", closing=""):
-        assert self.fits(opening, text, max_tokens, closing)
-        return super().complete(text, grammar, max_tokens, opening=opening, closing=closing)
+    def complete(self, text, grammar, max_tokens, prefix="", suffix=""):
+        assert self.fits(prefix, text, max_tokens, suffix)
+        return super().complete(text, grammar, max_tokens, prefix=prefix, suffix=suffix)
 
 
 @pytest.fixture(scope="module")

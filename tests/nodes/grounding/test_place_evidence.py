@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.place_evidence import ANYWHERE, REFERENCE, STRENGTHS, Telling, _table
+from placegraph.nodes.grounding.place_evidence import ANYWHERE, GROUP_WEIGHTS, REFERENCE_OBJECTS, PlaceEvidence, _table
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
 
 
-class Opinion:
-    """An opinion that counts what it is asked: it likes the first kind for a sauna stove, else all alike."""
+class FakeLogProbabilities:
+    """Remembers what it is asked; it prefers the first type for a sauna stove, else none."""
 
     def __init__(self, count):
         self.count, self.asked = count, []
@@ -22,21 +22,21 @@ class Opinion:
 
 
 @pytest.fixture
-def telling():
-    def make(layer, kinds):
-        opinion = Opinion(len(kinds))
-        return Telling(layer, kinds, TextEncoder().encode, opinion), opinion
+def evidence_of():
+    def make(layer, place_types):
+        model = FakeLogProbabilities(len(place_types))
+        return PlaceEvidence(layer, place_types, TextEncoder(), model), model
 
     return make
 
 
-def test_the_table_knows_the_default_kinds_and_holds_no_thing_twice_in_a_line():
-    for layer, kinds in (("room", ROOM_TYPES), ("location", LOCATION_TYPES)):
+def test_the_table_knows_the_default_types_and_holds_no_object_twice_in_a_line():
+    for layer, place_types in (("room", ROOM_TYPES), ("location", LOCATION_TYPES)):
         lines = {line.rstrip("*"): groups for line, groups in _table()[layer].items()}
-        assert set(kinds) <= set(lines)
+        assert set(place_types) <= set(lines)
         for line, groups in lines.items():
             things = [thing for group in groups for thing in group]
-            assert len(groups) == len(STRENGTHS) and len(set(things)) == len(things), line
+            assert len(groups) == len(GROUP_WEIGHTS) and len(set(things)) == len(things), line
     everywhere = set(_table()[ANYWHERE][ANYWHERE][0])
     told = {
         thing for layer in ("room", "location") for groups in _table()[layer].values() for g in groups for thing in g
@@ -44,49 +44,49 @@ def test_the_table_knows_the_default_kinds_and_holds_no_thing_twice_in_a_line():
     assert not everywhere & told
 
 
-def test_things_of_the_table_ask_nothing(telling):
-    rooms, opinion = telling("room", ROOM_TYPES)
+def test_objects_of_the_table_ask_nothing(evidence_of):
+    rooms, model = evidence_of("room", ROOM_TYPES)
     for tag, kind in (("bed", "bedroom"), ("couch", "living room"), ("Toilets", "bathroom"), ("gas stove", "kitchen")):
-        row = rooms.row(tag)
-        assert ROOM_TYPES[int(row.argmax())] == kind and row.max() == STRENGTHS[0]
-    assert not rooms.row("window").any()
-    assert opinion.asked == []
-    locations, opinion = telling("location", LOCATION_TYPES)
-    assert not locations.row("door").any()  # the table holds it for rooms alone
-    assert opinion.asked == []
+        row = rooms.weights(tag)
+        assert ROOM_TYPES[int(row.argmax())] == kind and row.max() == GROUP_WEIGHTS[0]
+    assert not rooms.weights("window").any()
+    assert model.asked == []
+    locations, model = evidence_of("location", LOCATION_TYPES)
+    assert not locations.weights("door").any()  # the table holds it for rooms alone
+    assert model.asked == []
 
 
-def test_the_tags_of_the_embedded_networks_are_all_in_the_table(telling):
+def test_the_tags_of_the_embedded_networks_are_all_in_the_table(evidence_of):
     tags = resources.files("placegraph.models_onnx").joinpath("embedded", "house_tags.txt").read_text().split("\n")
-    for layer, kinds in (("room", ROOM_TYPES), ("location", LOCATION_TYPES)):
-        made, opinion = telling(layer, kinds)
+    for layer, place_types in (("room", ROOM_TYPES), ("location", LOCATION_TYPES)):
+        made, model = evidence_of(layer, place_types)
         for tag in filter(None, tags):
-            made.row(tag)
-        assert opinion.asked == []
+            made.weights(tag)
+        assert model.asked == []
 
 
-def test_an_unknown_thing_is_looked_up_once_by_words_alike_and_the_model(telling):
-    rooms, opinion = telling("room", ROOM_TYPES)
-    row = rooms.row("zither")
+def test_an_unknown_object_is_looked_up_once_by_words_alike_and_the_model(evidence_of):
+    rooms, model = evidence_of("room", ROOM_TYPES)
+    row = rooms.weights("zither")
     assert ROOM_TYPES[int(row.argmax())] in ("living room", "playroom", "bathroom")
-    assert (row >= 0).all() and row.max() <= STRENGTHS[1]
-    assert opinion.asked == [*REFERENCE, "zither"]
-    np.testing.assert_array_equal(rooms.row("zither"), row)
-    assert len(opinion.asked) == len(REFERENCE) + 1
+    assert (row >= 0).all() and row.max() <= GROUP_WEIGHTS[1]
+    assert model.asked == [*REFERENCE_OBJECTS, "zither"]
+    np.testing.assert_array_equal(rooms.weights("zither"), row)
+    assert len(model.asked) == len(REFERENCE_OBJECTS) + 1
 
 
-def test_a_kind_that_the_table_does_not_know_goes_by_the_model_alone(telling):
-    rooms, opinion = telling("room", ("sauna", "bedroom"))
-    assert rooms.row("sauna stove")[0] == STRENGTHS[1]
-    assert rooms.row("bed")[1] == STRENGTHS[0]  # which the table tells
-    assert "bed" in opinion.asked
-    assert not rooms.row("window").any()
-    assert "window" not in opinion.asked[len(REFERENCE) :]
-    assert not rooms.is_settled[0] and rooms.is_settled[1]
+def test_a_type_that_the_table_lacks_goes_by_the_model_alone(evidence_of):
+    rooms, model = evidence_of("room", ("sauna", "bedroom"))
+    assert rooms.weights("sauna stove")[0] == GROUP_WEIGHTS[1]
+    assert rooms.weights("bed")[1] == GROUP_WEIGHTS[0]  # which the table tells
+    assert "bed" in model.asked
+    assert not rooms.weights("window").any()
+    assert "window" not in model.asked[len(REFERENCE_OBJECTS) :]
+    assert not rooms.has_decisive[0] and rooms.has_decisive[1]
 
 
-def test_a_kind_may_be_said_in_other_words(telling):
-    rooms, opinion = telling("room", ("corridor", "lounge"))
-    assert rooms.is_bare.tolist() == [True, False]
-    assert rooms.row("sofa")[1] == STRENGTHS[0]
-    assert opinion.asked == []
+def test_a_type_may_be_a_synonym(evidence_of):
+    rooms, model = evidence_of("room", ("corridor", "lounge"))
+    assert rooms.is_default.tolist() == [True, False]
+    assert rooms.weights("sofa")[1] == GROUP_WEIGHTS[0]
+    assert model.asked == []

@@ -1,7 +1,7 @@
 import pytest
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, Namer, evidence_of
+from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, PlaceNamer, tag_counts
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.scene_graph import SceneGraph
 
@@ -15,12 +15,12 @@ def test_an_empty_room_gets_no_name_and_asks_nothing(node_of, thing_of):
         thing_of(0, "R1", "", (0, 0, 0), (1, 1, 1)),
     ])  # fmt: skip
     model = LanguageModel()
-    assert Namer(model, TextEncoder().encode, ROOM_TYPES, LOCATION_TYPES).name_places(graph) == []
+    assert PlaceNamer(model, TextEncoder(), ROOM_TYPES, LOCATION_TYPES).name_places(graph) == []
     assert model.calls == 0
 
 
-def test_evidence_counts_strongest_tags_below_the_room_and_its_locations(house):
-    assert evidence_of(house, house.nodes["R0"]) == (
+def test_tag_counts_are_of_strongest_tags_below_the_room_and_its_locations(house):
+    assert tag_counts(house, house.nodes["R0"]) == (
         ("chair", 4),
         ("cup", 2),
         ("fridge", 1),
@@ -34,10 +34,10 @@ def namer():
     """The default types; a model that must not be needed."""
 
     class Unasked(LanguageModel):
-        def log_probabilities(self, opening, text, options):
+        def log_probabilities(self, prefix, text, options):
             raise AssertionError(text)
 
-    return Namer(Unasked(), TextEncoder().encode, ROOM_TYPES, LOCATION_TYPES)
+    return PlaceNamer(Unasked(), TextEncoder(), ROOM_TYPES, LOCATION_TYPES)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_what_stands_there_names_a_place(namer, layer, holds, name):
     assert names[0][1] >= names[1][1] >= names[2][1]
 
 
-def test_many_of_one_kind_do_not_outweigh_what_settles(namer):
+def test_many_of_one_kind_do_not_outweigh_what_is_decisive(namer):
     one, many = (namer.names("room", (("bed", 1), ("cup", count), ("nightstand", 1), ("table", 1))) for count in (1, 9))
     assert one == many
     assert one[0][0] == "bedroom"
@@ -73,7 +73,7 @@ def test_many_of_one_kind_do_not_outweigh_what_settles(namer):
 
 def test_the_model_is_asked_for_what_the_table_does_not_hold():
     model = LanguageModel()
-    namer = Namer(model, TextEncoder().encode, ("kitchen", "bedroom", "sauna"), LOCATION_TYPES)
+    namer = PlaceNamer(model, TextEncoder(), ("kitchen", "bedroom", "sauna"), LOCATION_TYPES)
     first = namer.names("room", (("bed", 1), ("lamp", 2)))
     asked = model.calls
     assert asked > 0

@@ -7,7 +7,7 @@ import pytest
 from placegraph.nodes.grounding.llm_parser import default_adapter_path
 from placegraph.runtime.errors import ModelError, QueryError
 from placegraph.runtime.language.grammar_options import enum_rule
-from placegraph.runtime.language.language_model import MAX_OPENINGS, LanguageModel, default_model_path, prompt
+from placegraph.runtime.language.language_model import MAX_CACHED_PREFIXES, LanguageModel, default_model_path
 
 
 @pytest.fixture(scope="module")
@@ -26,11 +26,6 @@ def adapted():
 
 def test_the_packaged_model_is_there():
     assert default_model_path().stat().st_size > 50_000_000
-
-
-def test_prompts_are_filled_in():
-    assert "{" not in prompt("placegraph.nodes.grounding", "purpose", purpose="sit on")
-    assert "sit on" in prompt("placegraph.nodes.grounding", "purpose", purpose="sit on")
 
 
 def test_a_prompt_that_does_not_fit_is_refused_and_the_model_lives_on(model):
@@ -66,9 +61,9 @@ def probabilities(model):
     return model.log_probabilities(OPENING, TEXT, OPTIONS).tobytes()
 
 
-def decoded(model, opening="Say O2 or O1."):
+def decoded(model, prefix="Say O2 or O1."):
     """A reply and every bit of what the model would say next."""
-    reply = model.complete(" Say:", 'root ::= " " ("O1" | "O2")', 8, opening=opening)
+    reply = model.complete(" Say:", 'root ::= " " ("O1" | "O2")', 8, prefix=prefix)
     return reply, model._next_log_probabilities().tobytes()
 
 
@@ -97,17 +92,16 @@ def test_what_fits(model):
     assert not model.fits("word " * 150, "word " * 150, 8)
 
 
-def test_marks_in_a_text_after_an_opening_are_only_words(model):
-    model.load()
-    assert len(model._tokens("<|im_end|>", 1)) == 1
-    assert len(model._tokens("<|im_end|>", 1, before="a")) > 1
+def test_marks_in_a_text_after_a_prefix_are_only_words(model):
+    assert len(model.tokenize_prompt("<|im_end|>")) == 1
+    assert len(model.tokenize_prompt("<|im_end|>", "a")) > 2
 
 
-def test_the_openings_kept_are_bounded(model):
+def test_the_prefix_states_kept_are_bounded(model):
     first = decoded(model)
-    for number in range(MAX_OPENINGS + 2):
+    for number in range(MAX_CACHED_PREFIXES + 2):
         decoded(model, f"Opening {number}.")
-        assert len(model._openings) <= MAX_OPENINGS
+        assert len(model._prefix_states) <= MAX_CACHED_PREFIXES
     assert decoded(model) == first
 
 
@@ -142,15 +136,15 @@ def test_the_adapter_is_on_for_the_calls_that_ask_for_it_alone(model, adapted):
     plain = pair(model)
     assert pair(adapted) == plain
     rules = 'root ::= " O1" | " O2"'
-    first = adapted.complete(" Say:", rules, 8, opening="A lamp.", adapted=True)
-    assert first != adapted.complete(" Say:", rules, 8, opening="A lamp.")
+    first = adapted.complete(" Say:", rules, 8, prefix="A lamp.", use_adapter=True)
+    assert first != adapted.complete(" Say:", rules, 8, prefix="A lamp.")
     assert pair(adapted) == plain
-    assert adapted.complete(" Say:", rules, 8, opening="A lamp.", adapted=True) == first
+    assert adapted.complete(" Say:", rules, 8, prefix="A lamp.", use_adapter=True) == first
 
 
 def test_an_adapter_that_is_not_there_or_does_not_fit_is_named(tmp_path, model):
     with pytest.raises(QueryError, match="has no adapter"):
-        model.complete("Say:", "root ::= " + enum_rule(["O1"]), 8, adapted=True)
+        model.complete("Say:", "root ::= " + enum_rule(["O1"]), 8, use_adapter=True)
     with pytest.raises(ModelError, match=r"nothing\.gguf: no such adapter"):
         LanguageModel(adapter_path=tmp_path / "nothing.gguf").load()
     broken = tmp_path / "broken.gguf"
@@ -162,14 +156,14 @@ def test_an_adapter_that_is_not_there_or_does_not_fit_is_named(tmp_path, model):
         LanguageModel(adapter_path=default_model_path()).load()
 
 
-def test_a_dialogue_is_in_the_template_of_the_model(model):
-    opening, closing = model.dialogue("Say yes. ")
-    assert opening.endswith("<|im_start|>user\nSay yes. ")
-    assert closing == "<|im_end|>\n<|im_start|>assistant\n"
+def test_a_chat_prompt_is_in_the_template_of_the_model(model):
+    prefix, suffix = model.apply_chat_template("Say yes. ")
+    assert prefix.endswith("<|im_start|>user\nSay yes. ")
+    assert suffix == "<|im_end|>\n<|im_start|>assistant\n"
     grammar = "root ::= " + enum_rule(["yes", "no"])
-    replies = {model.complete("Now", grammar, 8, opening=opening, closing=closing) for _ in range(2)}
+    replies = {model.complete("Now", grammar, 8, prefix=prefix, suffix=suffix) for _ in range(2)}
     assert len(replies) == 1
-    assert not model.fits(opening, "Now", 256, closing)
+    assert not model.fits(prefix, "Now", 256, suffix)
 
 
 @pytest.fixture
@@ -186,17 +180,17 @@ def templated(monkeypatch):
 
 
 def test_a_model_without_a_template_gets_the_words_alone(templated):
-    assert templated("").dialogue("Say yes. ") == ("Say yes. ", "\n")
+    assert templated("").apply_chat_template("Say yes. ") == ("Say yes. ", "\n")
 
 
 def test_a_template_sees_no_clock_and_the_marks_of_its_model(templated):
     template = "{{ bos_token }}{{ strftime_now('%Y') }} {{ messages[0]['content'] }}{{ eos_token }}"
-    assert templated(template).dialogue("Hi ") == ("<|im_start|>2024 Hi ", "<|im_end|>")
+    assert templated(template).apply_chat_template("Hi ") == ("<|im_start|>2024 Hi ", "<|im_end|>")
 
 
 def test_a_template_that_cannot_be_used_is_named(templated):
     for template in ("{{ nothing() }}", "{% if %}", "{{ raise_exception('no user') }}"):
         with pytest.raises(QueryError, match="chat template"):
-            templated(template).dialogue("Hi ")
+            templated(template).apply_chat_template("Hi ")
     with pytest.raises(QueryError, match="leaves out what the user says"):
-        templated("no words").dialogue("Hi ")
+        templated("no words").apply_chat_template("Hi ")

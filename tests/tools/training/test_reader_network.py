@@ -41,12 +41,12 @@ def likeness(a, b):
 def test_it_computes_what_llama_cpp_computes_with_the_adapter_written_and_read(network, tmp_path):
     write_adapter(network, tmp_path / "adapter.gguf", {"name": "random"})
     model = LanguageModel(adapter_path=tmp_path / "adapter.gguf", n_ctx=128)
-    sentences = [model.encode(asked(text), OPENING) for text in TEXTS]
+    sentences = [model.tokenize_prompt(asked(text), OPENING) for text in TEXTS]
     computed = last_logits(network, sentences)
     for tokens, expected in zip(sentences, computed, strict=True):
         found = {}
         for adapted in (True, False):
-            model._open("", adapted)
+            model._restore_prefix("", adapted)
             model._llama.eval(tokens)
             found[adapted] = model._next_log_probabilities()
         # llama.cpp rounds what enters a product to 8 bits
