@@ -86,7 +86,7 @@ class InstanceSegmenter(Protocol):
 
 @runtime_checkable
 class LocationDetector(Protocol):
-    """Bird's-eye image of a room to the places in it whose objects are used together."""
+    """Bird's-eye image of a room to its locations: places whose objects are used together."""
 
     def locate(self, image: U8) -> ScoredMasks:
         """One mask for each location that was found; masks may overlap."""

@@ -1,9 +1,9 @@
-"""Read our box-prompted segmenter: one pass of the encoder an image, one of the decoder for all of its boxes.
+"""Our box-prompted segmenter: one pass of the encoder for each image, one of the decoder for all of its boxes.
 
 The split is SAM's, the layout ours: encoder `images` (1, 3, H, W) RGB 0..1, letterboxed in the middle with grey 114,
 and, in exports that take it, `depth` (1, 1, H, W) metres (0 = none), to `image_embeddings`; decoder `image_embeddings`
 and `boxes` (N, 4) x0 y0 x1 y1 as shares of the input, to `masks` (N, 1, G, G) logits and `iou_predictions` (N, 1).
-Departs from SAM: a mask's grid covers its box, grown by a margin, not the whole image: small things keep their shape.
+Not as in SAM: a mask's grid covers its box, grown by a margin, not the whole image, so small things keep their shape.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from placegraph.models_onnx import Masks
 from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
-from placegraph.models_onnx.yolo import prepare
+from placegraph.models_onnx.yolo import prepare_input
 from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
@@ -29,7 +29,7 @@ class Options(ModelOptions):
 
 
 class FAMILY:
-    """Encoder and decoder as a Segmenter; the encoder says by its inputs whether it wants depth."""
+    """Encoder and decoder as a Segmenter; depth is used when the encoder has an input for it."""
 
     def __init__(self, weights: Weights, threads: int = 1) -> None:
         """Load both files and check the layout; raises ModelError when it is not such an export."""
@@ -57,7 +57,7 @@ class FAMILY:
         """
         if not len(boxes_px):
             return []
-        feed, placed = prepare(image, self._height, self._width)
+        feed, placed = prepare_input(image, self._height, self._width)
         feeds = {"images": feed}
         if self._takes_depth:
             feeds["depth"] = self._place_depth(depth_m, placed)
@@ -72,7 +72,7 @@ class FAMILY:
         ]
 
     def _place_depth(self, depth_m: F32, placed: Letterbox) -> F32:
-        """Depth (H, W) as the letterbox places the image; nearest, for a mean of two surfaces lies on neither."""
+        """Depth (H, W) placed as the image is; nearest neighbour, because a mean of two surfaces lies on neither."""
         canvas = np.zeros((self._height, self._width), np.float32)
         width, height = round(placed.scale_x * placed.width), round(placed.scale_y * placed.height)
         resized = cv2.resize(depth_m, (width, height), interpolation=cv2.INTER_NEAREST)

@@ -1,4 +1,4 @@
-"""Boxes of a detector's raw output: overlap, and the suppression of repeated finds."""
+"""Boxes of a detector's raw output: overlap and non-maximum suppression."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ import numpy as np
 from placegraph.models_onnx import Boxes
 from placegraph.runtime.arrays import F32, I64
 
-MAX_CANDIDATES = 1000  # boxes that enter suppression; bounds its time on a network that fires everywhere
+MAX_CANDIDATES = 1000  # that enter suppression; bounds its time when a network detects things everywhere
 
 
-def iou(one: F32, many: F32) -> F32:
-    """Intersection over union of one box (4,) with many (N, 4), px; 0 where both are empty."""
-    low = np.maximum(one[:2], many[:, :2])
-    high = np.minimum(one[2:], many[:, 2:])
+def box_iou(box: F32, boxes: F32) -> F32:
+    """Intersection over union of a box (4,) with boxes (N, 4), px; 0 where both are empty."""
+    low = np.maximum(box[:2], boxes[:, :2])
+    high = np.minimum(box[2:], boxes[:, 2:])
     shared = np.prod(np.maximum(high - low, 0), axis=1)
-    areas = np.prod(np.maximum(many[:, 2:] - many[:, :2], 0), axis=1)
-    union = np.prod(np.maximum(one[2:] - one[:2], 0)) + areas - shared
-    found: F32 = np.divide(shared, union, out=np.zeros(len(many), np.float32), where=union > 0).astype(np.float32)
-    return found
+    areas = np.prod(np.maximum(boxes[:, 2:] - boxes[:, :2], 0), axis=1)
+    union = np.prod(np.maximum(box[2:] - box[:2], 0)) + areas - shared
+    ratio = np.divide(shared, union, out=np.zeros(len(boxes), np.float32), where=union > 0)
+    return np.asarray(ratio, np.float32)
 
 
-def from_centres(centres: F32) -> F32:
+def corners_from_centres(centres: F32) -> F32:
     """(N, 4) cx cy w h to x_min y_min x_max y_max."""
     half = centres[:, 2:] / 2
     return np.concatenate([centres[:, :2] - half, centres[:, :2] + half], axis=1).astype(np.float32)
 
 
-def suppress(boxes: F32, scores: F32, classes: I64, nms_iou: float) -> I64:
-    """Greedy suppression within each class: indices of the boxes (N, 4) kept, best score first (ties: lower index)."""
+def non_maximum_suppression(boxes: F32, scores: F32, classes: I64, nms_iou: float) -> I64:
+    """Greedily, within each class: indices of the boxes (N, 4) kept, best score first (ties: lower index)."""
     order = np.argsort(-scores, kind="stable")[:MAX_CANDIDATES]
     kept: list[int] = []
     while len(order):
         best, rest = order[0], order[1:]
         kept.append(int(best))
-        repeats = (iou(boxes[best], boxes[rest]) > nms_iou) & (classes[rest] == classes[best])
+        repeats = (box_iou(boxes[best], boxes[rest]) > nms_iou) & (classes[rest] == classes[best])
         order = rest[~repeats]
     return np.array(kept, np.int64)
 
@@ -51,9 +51,9 @@ def best_classes(scores: F32, min_score: float) -> tuple[I64, I64, F32]:
     return anchors, classes[anchors], best[anchors].astype(np.float32)
 
 
-def named(names: Sequence[str], classes: I64, boxes: F32, scores: F32) -> Boxes:
+def named_boxes(names: Sequence[str], classes: I64, boxes: F32, scores: F32) -> Boxes:
     """Boxes (N, 4) of class indices (N,) as named boxes; empty ones (all outside the image) are left out."""
-    solid = np.all(boxes[:, 2:] > boxes[:, :2], axis=1)
-    picked = tuple(names[i] for i in classes[solid].tolist())
-    clipped = np.clip(scores[solid], 0, 1).astype(np.float32)
-    return Boxes(picked, np.ascontiguousarray(boxes[solid], np.float32), clipped)
+    has_area = np.all(boxes[:, 2:] > boxes[:, :2], axis=1)
+    kept_names = tuple(names[i] for i in classes[has_area].tolist())
+    clipped = np.clip(scores[has_area], 0, 1).astype(np.float32)
+    return Boxes(kept_names, np.ascontiguousarray(boxes[has_area], np.float32), clipped)

@@ -1,4 +1,4 @@
-"""Read image classifiers of the ImageNet kind, as taggers of the whole image.
+"""Image classifiers of the ImageNet kind, as taggers of the whole image.
 
 Source: the common export layout: input (1, 3, H, W) or (1, H, W, 3) RGB, (pixel - mean) / std, the image squashed to
 the input; output (1, C) logits or probabilities.
@@ -72,7 +72,7 @@ def probabilities(raw: F32) -> F32:
 
 
 def first_synonym(label: str) -> str:
-    """What stands before the first comma ("tench" of "tench, Tinca tinca"), with underscores as spaces."""
+    """The text before the first comma ("tench" of "tench, Tinca tinca"), with underscores as spaces."""
     return label.split(",")[0].replace("_", " ").strip()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from placegraph.models_onnx.manifest import find
+from placegraph.models_onnx.manifest import find_weights
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.node import plugin
 
@@ -17,9 +17,9 @@ def load(name: str, model_dirs: Sequence[Path | str] = (), threads: int = 1) -> 
         ModelError: its weights are absent, damaged, or not of the family's layout.
         ConfigError: the manifest names a family that does not exist.
     """
-    weights = find(name, model_dirs)
-    built: object = plugin("placegraph.models_onnx", weights.family, "FAMILY", "model family")(weights, threads)
-    return built
+    weights = find_weights(name, model_dirs)
+    network: object = plugin("placegraph.models_onnx", weights.family, "FAMILY", "model family")(weights, threads)
+    return network
 
 
 def wrong_task(node: str, name: str, model: object, task: str) -> ConfigError:

@@ -1,4 +1,4 @@
-"""Which weights there are, and where their files lie. Every file is verified before it is used.
+"""The known weights and where their files are. Every file is verified by its checksum before it is used.
 
 A manifest is a TOML file of tables `[weights.<name>]`; `models_onnx/manifest.toml` is ours and says how to write one.
 Each folder of models may hold another, for weights that are not ours.
@@ -42,7 +42,7 @@ class FileEntry(ModelOptions):
     url: str = ""  # where `placegraph models fetch` gets it; "": it must be imported
 
 
-class Entry(ModelOptions):
+class WeightsEntry(ModelOptions):
     """One table of a manifest."""
 
     family: str
@@ -54,11 +54,11 @@ class Entry(ModelOptions):
 
 
 @dataclass(frozen=True)
-class Listed:
+class ManifestEntry:
     """A manifest's entry with the place it was read from."""
 
     name: str
-    entry: Entry
+    entry: WeightsEntry
     manifest: Path
 
 
@@ -89,45 +89,45 @@ class Weights:
         try:
             return kind.model_validate(self.options)
         except ValidationError as error:
-            raise ModelError(f"weights {self.name!r}, options: {_first(error)}") from error
+            raise ModelError(f"weights {self.name!r}, options: {_first_problem(error)}") from error
 
 
-def folders(model_dirs: Sequence[Path | str] = ()) -> list[Path]:
-    """Folders searched for files, in order: embedded, weights, those of $PLACEGRAPH_MODELS, then `model_dirs`."""
-    named = [Path(part) for part in os.environ.get(MODELS_VARIABLE, "").split(os.pathsep) if part]
-    found = [EMBEDDED_DIR, WEIGHTS_DIR, *named, *(Path(folder) for folder in model_dirs)]
-    return list(dict.fromkeys(Path(folder).expanduser().resolve() for folder in found))
+def model_folders(model_dirs: Sequence[Path | str] = ()) -> list[Path]:
+    """The folders searched for files, in order: embedded, weights, those of $PLACEGRAPH_MODELS, then `model_dirs`."""
+    from_environment = [Path(part) for part in os.environ.get(MODELS_VARIABLE, "").split(os.pathsep) if part]
+    all_folders = [EMBEDDED_DIR, WEIGHTS_DIR, *from_environment, *(Path(folder) for folder in model_dirs)]
+    return list(dict.fromkeys(Path(folder).expanduser().resolve() for folder in all_folders))
 
 
-def entries(model_dirs: Sequence[Path | str] = ()) -> dict[str, Listed]:
+def known_weights(model_dirs: Sequence[Path | str] = ()) -> dict[str, ManifestEntry]:
     """All known weights by name: ours, then those of each folder's own manifest.
 
     Raises:
         ModelError: a manifest cannot be read, or two of them describe the same name.
     """
-    manifests = [PACKAGE_DIR / "manifest.toml", *(folder / "manifest.toml" for folder in folders(model_dirs))]
-    known: dict[str, Listed] = {}
+    manifests = [PACKAGE_DIR / "manifest.toml", *(folder / "manifest.toml" for folder in model_folders(model_dirs))]
+    known: dict[str, ManifestEntry] = {}
     for path in manifests:
         if not path.is_file():
             continue
         for name, entry in _read(path).items():
             if name in known:
                 raise ModelError(f"weights {name!r} are described twice: {known[name].manifest} and {path}")
-            known[name] = Listed(name, entry, path)
+            known[name] = ManifestEntry(name, entry, path)
     return known
 
 
-def find(name: str, model_dirs: Sequence[Path | str] = ()) -> Weights:
-    """Find and verify the files of the weights `name`.
+def find_weights(name: str, model_dirs: Sequence[Path | str] = ()) -> Weights:
+    """The weights `name`, with every file verified.
 
     Raises:
-        ModelError: the name is unknown, a file is in none of the folders (they are listed), or is not the right one.
+        ModelError: the name is unknown, a file is in none of the folders, or its checksum is wrong.
     """
-    known = entries(model_dirs)
+    known = known_weights(model_dirs)
     if name not in known:
         raise ModelError(f"no weights named {name!r}; there are: {', '.join(sorted(known))}")
     entry = known[name].entry
-    files = {role: locate(known[name], role, model_dirs) for role in entry.files}
+    files = {role: find_verified_file(known[name], role, model_dirs) for role in entry.files}
     labels = entry.labels
     if LABELS_ROLE in files:
         if labels:
@@ -136,42 +136,43 @@ def find(name: str, model_dirs: Sequence[Path | str] = ()) -> Weights:
     return Weights(name, entry.family, files, labels, dict(entry.options))
 
 
-def find_file(listed: Listed, role: str, model_dirs: Sequence[Path | str] = ()) -> Path | None:
-    """Path of the first file with the name of a role's file, its content unread; None when no folder holds one."""
+def find_file(listed: ManifestEntry, role: str, model_dirs: Sequence[Path | str] = ()) -> Path | None:
+    """Path of the first file with the name of a role's file, not verified; None when no folder holds one."""
     name = listed.entry.files[role].file
     paths = (folder / name for folder in _searched(listed, model_dirs))
     return next((path for path in paths if path.is_file()), None)
 
 
-def locate(listed: Listed, role: str, model_dirs: Sequence[Path | str] = ()) -> Path:
+def find_verified_file(listed: ManifestEntry, role: str, model_dirs: Sequence[Path | str] = ()) -> Path:
     """Path of the file of a role whose checksum is right.
 
     Raises:
-        ModelError: no folder holds it, or none that does holds it with the manifest's sha256.
+        ModelError: no folder holds it, or only with another sha256 than the manifest's.
     """
-    wanted, searched = listed.entry.files[role], _searched(listed, model_dirs)
+    expected, searched = listed.entry.files[role], _searched(listed, model_dirs)
     wrong: list[str] = []
-    for path in (folder / wanted.file for folder in searched):
+    for path in (folder / expected.file for folder in searched):
         if not path.is_file():
             continue
         digest = sha256(path)
-        if digest == wanted.sha256:
+        if digest == expected.sha256:
             return path
         wrong.append(f"{path} has {digest}")
     if wrong:
         raise ModelError(
-            f"weights {listed.name!r}: {wanted.file} should have sha256 {wanted.sha256}, but {'; '.join(wrong)}"
+            f"weights {listed.name!r}: {expected.file} should have sha256 {expected.sha256}, but {'; '.join(wrong)}"
         )
-    get = f"`placegraph models fetch {listed.name}`" if wanted.url else "`placegraph models import DIR`"
+    how = f"`placegraph models fetch {listed.name}`" if expected.url else "`placegraph models import DIR`"
     raise ModelError(
-        f"weights {listed.name!r}: {wanted.file} ({role}) is in none of: {', '.join(map(str, searched))}; "
-        f"get it with {get}, or name its folder in the environment variable {MODELS_VARIABLE}"
+        f"weights {listed.name!r}: {expected.file} ({role}) is in none of: {', '.join(map(str, searched))}; "
+        f"get it with {how}, or name its folder in the environment variable {MODELS_VARIABLE}"
     )
 
 
-def _searched(listed: Listed, model_dirs: Sequence[Path | str]) -> list[Path]:
-    beside = [] if listed.manifest.parent == PACKAGE_DIR else [listed.manifest.parent]  # names such as model.onnx recur
-    return list(dict.fromkeys([*beside, *folders(model_dirs)]))
+def _searched(listed: ManifestEntry, model_dirs: Sequence[Path | str]) -> list[Path]:
+    # the manifest's own folder first: file names such as model.onnx recur
+    first = [] if listed.manifest.parent == PACKAGE_DIR else [listed.manifest.parent]
+    return list(dict.fromkeys([*first, *model_folders(model_dirs)]))
 
 
 def read_lines(path: Path) -> tuple[str, ...]:
@@ -194,7 +195,7 @@ def sha256(path: Path) -> str:
         raise ModelError(f"{path}: {error}") from error
 
 
-def _read(path: Path) -> dict[str, Entry]:
+def _read(path: Path) -> dict[str, WeightsEntry]:
     try:
         table = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -204,12 +205,12 @@ def _read(path: Path) -> dict[str, Entry]:
     found = {}
     for name, body in table.get("weights", {}).items():
         try:
-            found[name] = Entry.model_validate(body)
+            found[name] = WeightsEntry.model_validate(body)
         except ValidationError as error:
-            raise ModelError(f"{path}: [weights.{name}] {_first(error)}") from error
+            raise ModelError(f"{path}: [weights.{name}] {_first_problem(error)}") from error
     return found
 
 
-def _first(error: ValidationError) -> str:
+def _first_problem(error: ValidationError) -> str:
     problem = error.errors()[0]
     return f"{'.'.join(map(str, problem['loc'])) or 'table'}: {problem['msg']}"

@@ -1,4 +1,4 @@
-"""Read RAM++ exports: many tags of the whole image, each with its own threshold.
+"""RAM++ exports: many tags of the whole image, each with its own threshold.
 
 Source: xinyu1205/recognize-anything (RAM++, arXiv 2310.15200): input (1, 3, 384, 384) RGB, squashed, ImageNet mean and
 deviation; output (1, T) logits; tags (`labels`) and thresholds (`thresholds`) one a line, in the order of the output.

@@ -1,4 +1,4 @@
-"""Read SAM and MobileSAM split exports: one pass of the encoder an image, one of the decoder a box.
+"""SAM and MobileSAM split exports: one pass of the encoder for each image, one of the decoder for each box.
 
 Source: the layout of segment-anything's SamOnnxModel, as published by samexporter: encoder `input_image`, either
 (H, W, 3) RGB 0..255 with the preprocessing inside, or (1, 3, 1024, 1024) normalised and padded right and below; decoder
@@ -107,8 +107,8 @@ class FAMILY:
 def upscale(low: F32, scales: F32, size: tuple[int, int]) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """Low-resolution logits (256, 256) of the padded square to a mask (H, W) of the image: positive inside.
 
-    Departs: one bilinear step from the logits instead of two through the 1024 px square. The export's own `masks` are
-    not used: tracing freezes the crop of some exports to the aspect of the image they were traced with.
+    Not as in SAM: one bilinear step from the logits instead of two through the 1024 px square. The export's own `masks`
+    are not used, because tracing freezes the crop of some exports to the aspect of the image they were traced with.
     """
     cells = scales * (LOW_RES / LONG_SIDE)  # low-resolution cells per px of the image
     to_cell = np.array([[cells[0], 0, 0.5 * cells[0] - 0.5], [0, cells[1], 0.5 * cells[1] - 0.5]], np.float64)

@@ -1,7 +1,7 @@
-"""Read semantic segmentation exports: one class a pixel, split into connected pieces that stand for instances.
+"""Semantic segmentation exports: one class for each pixel, split into connected pieces that stand for instances.
 
 Layout: input (1, 3, H, W) float32, R G B; output (1, C, h, w) logits, C as many as labels. Two things of one class
-that touch in the image come out as one piece: nothing in such an export tells them apart.
+that touch in the image become one piece, because such an export does not separate them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.models_onnx import Boxes, Instances, Masks, ScoredNames
-from placegraph.models_onnx.boxes import iou
+from placegraph.models_onnx.boxes import box_iou
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.runtime.arrays import F32, U8, Bool
@@ -25,8 +25,8 @@ class Options(ModelOptions):
     """What differs between semantic segmentation weights."""
 
     ignore: list[str] = Field(default_factory=list)  # labels that are no objects: background, wall, floor
-    min_confidence: float = Field(0.5, ge=0, le=1)  # softmax of a pixel's class; less sure pixels belong to nothing
-    min_area_px: int = Field(64, ge=1)  # px of the image; a smaller piece is noise more often than a thing
+    min_confidence: float = Field(0.5, ge=0, le=1)  # softmax of a pixel's class; pixels below belong to no piece
+    min_area_px: int = Field(64, ge=1)  # a smaller piece is noise more often than a thing
     mean: list[float] = Field([0.0, 0.0, 0.0], min_length=3, max_length=3)  # of 0..255 values, R G B
     std: list[float] = Field([255.0, 255.0, 255.0], min_length=3, max_length=3)
 
@@ -54,24 +54,24 @@ class FAMILY:
         A piece's score is the mean confidence of its pixels. Raises ModelError when the network cannot be run.
         """
         labels, confidence = self.classify(image)
-        found: list[tuple[float, str, list[int], Bool]] = []
-        sure = confidence >= self._options.min_confidence
+        pieces_found: list[tuple[float, str, list[int], Bool]] = []
+        is_sure = confidence >= self._options.min_confidence
         for label in self._objects:
-            of_class = ((labels == label) & sure).astype(np.uint8)
+            of_class = ((labels == label) & is_sure).astype(np.uint8)
             count, pieces, stats, _ = cv2.connectedComponentsWithStats(of_class, connectivity=8)
             for piece in range(1, count):
                 x, y, width, height, area = (int(value) for value in stats[piece])
                 if area >= self._options.min_area_px:
                     mask = np.asarray(pieces == piece)
                     score = float(confidence[mask].mean(dtype=np.float64))
-                    found.append((score, self._labels[label], [x, y, x + width, y + height], mask))
-        found.sort(key=lambda item: -item[0])  # stable: equal scores stay in order of class, then of first row
+                    pieces_found.append((score, self._labels[label], [x, y, x + width, y + height], mask))
+        pieces_found.sort(key=lambda item: -item[0])  # stable: equal scores stay in order of class, then of first row
         boxes = Boxes(
-            names=tuple(name for _, name, _, _ in found),
-            boxes_px=np.array([box for _, _, box, _ in found], np.float32).reshape(-1, 4),
-            scores=np.array([score for score, _, _, _ in found], np.float32),
+            names=tuple(name for _, name, _, _ in pieces_found),
+            boxes_px=np.array([box for _, _, box, _ in pieces_found], np.float32).reshape(-1, 4),
+            scores=np.array([score for score, _, _, _ in pieces_found], np.float32),
         )
-        return Instances(boxes, [mask for _, _, _, mask in found])
+        return Instances(boxes, [mask for _, _, _, mask in pieces_found])
 
     def detect(self, image: U8, names: Sequence[str]) -> Boxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
@@ -93,12 +93,12 @@ class FAMILY:
         if not len(boxes_px):
             return []
         pieces = self.instances(image, ())
-        nothing = np.zeros(image.shape[:2], bool)
+        empty = np.zeros(image.shape[:2], bool)
         masks: Masks = []
         for box in boxes_px:
-            overlap = iou(box, pieces.boxes.boxes_px)
+            overlap = box_iou(box, pieces.boxes.boxes_px)
             best = int(overlap.argmax()) if len(overlap) else -1
-            masks.append(pieces.masks[best] if best >= 0 and overlap[best] > 0 else nothing)
+            masks.append(pieces.masks[best] if best >= 0 and overlap[best] > 0 else empty)
         return masks
 
     def classify(self, image: U8) -> tuple[NDArray[np.intp], F32]:
@@ -107,7 +107,7 @@ class FAMILY:
         Raises ModelError when the network cannot be run on this image.
         """
         height, width = image.shape[:2]
-        logits = self._session.run({self._input: self.prepare(image)})[self._output][0]
+        logits = self._session.run({self._input: self.prepare_input(image)})[self._output][0]
         labels = logits.argmax(axis=0)
         top = logits.max(axis=0)
         confidence = np.asarray(1 / np.exp(logits - top).sum(axis=0), np.float32)
@@ -120,7 +120,7 @@ class FAMILY:
             )
         return labels, confidence
 
-    def prepare(self, image: U8) -> F32:
+    def prepare_input(self, image: U8) -> F32:
         """(H, W, 3) uint8 sRGB to the input (1, 3, H', W'), squashed to the size that the export fixes, if it does."""
         fixed = self._session.inputs[self._input]
         height = fixed[2] if isinstance(fixed[2], int) else image.shape[0]

@@ -1,4 +1,4 @@
-"""Run an ONNX file: the only importer of onnxruntime. Names and shapes are checked before anything is run."""
+"""Run an ONNX file (the only onnxruntime import). Names and shapes are checked before anything is run."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ _RUN_ERRORS: tuple[type[Exception], ...] = (*_ORT_ERRORS, ValueError)  # ValueEr
 
 
 class Session:
-    """One ONNX file, loaded for the CPU: sequential, `threads` threads, no spinning (a spinning pool starves the
-    other processes of a small machine: 10.0 against 2.1 ms measured on a loaded one).
+    """One ONNX file, loaded for the CPU: sequential, `threads` threads, no spinning.
+
+    A pool of spinning threads starves the other processes of a small machine: 10.0 instead of 2.1 ms on a loaded one.
 
     `inputs` and `outputs` map names to shapes; a dimension left open in the file is a string.
     """
@@ -64,14 +65,14 @@ class Session:
             ModelError: a name is absent or a shape does not fit; names the file, the tensor and both shapes.
         """
         sizes: dict[str, int] = {}
-        for kind, have, want in (("input", self.inputs, inputs or {}), ("output", self.outputs, outputs or {})):
-            for name, pattern in want.items():
-                if name not in have:
-                    raise ModelError(f"{self.path}: no {kind} named {name!r}; there are: {_listing(have)}")
-                if not _fits(have[name], pattern, sizes):
+        for kind, shapes, patterns in (("input", self.inputs, inputs or {}), ("output", self.outputs, outputs or {})):
+            for name, pattern in patterns.items():
+                if name not in shapes:
+                    raise ModelError(f"{self.path}: no {kind} named {name!r}; there are: {_listing(shapes)}")
+                if not _fits(shapes[name], pattern, sizes):
                     known = f" with {sizes}" if sizes else ""
                     raise ModelError(
-                        f"{self.path}: {kind} {name!r} has shape {list(have[name])}, expected {list(pattern)}{known}"
+                        f"{self.path}: {kind} {name!r} has shape {list(shapes[name])}, expected {list(pattern)}{known}"
                     )
         return sizes
 
@@ -97,11 +98,11 @@ class Session:
             results = self._session.run(list(self.outputs), dict(feeds))
         except _RUN_ERRORS as error:
             raise ModelError(f"{self.path}: cannot be run on these inputs: {error}") from error
-        found = {name: np.asarray(value) for name, value in zip(self.outputs, results, strict=True)}
-        for name, value in found.items():
+        values = {name: np.asarray(value) for name, value in zip(self.outputs, results, strict=True)}
+        for name, value in values.items():
             if value.dtype.kind == "f" and np.isnan(value).any():
                 raise ModelError(f"{self.path}: output {name!r} holds NaN")
-        return found
+        return values
 
 
 def _shape(dims: list[Any]) -> Shape:
@@ -112,12 +113,12 @@ def _listing(shapes: Mapping[str, Shape]) -> str:
     return ", ".join(f"{name} {list(shape)}" for name, shape in shapes.items()) or "none"
 
 
-def _fits(have: Shape, pattern: Shape, sizes: dict[str, int]) -> bool:
-    if len(have) != len(pattern):
+def _fits(shape: Shape, pattern: Shape, sizes: dict[str, int]) -> bool:
+    if len(shape) != len(pattern):
         return False
-    for size, want in zip(have, pattern, strict=True):
+    for size, expected in zip(shape, pattern, strict=True):
         if isinstance(size, str):
             continue
-        if (sizes.setdefault(want, size) if isinstance(want, str) else want) != size:
+        if (sizes.setdefault(expected, size) if isinstance(expected, str) else expected) != size:
             return False
     return True

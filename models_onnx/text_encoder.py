@@ -1,4 +1,4 @@
-"""Words to vectors, so that "couch" meets "sofa": the only importer of wordllama."""
+"""Words to vectors, so that "couch" is near "sofa" (the only wordllama import)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from placegraph.runtime.arrays import F32
 from placegraph.runtime.errors import ModelError
 
 DIMENSIONS = 256  # of the embedding that travels in wordllama's wheel
-MAX_TEXTS = 8192  # departs: vectors kept, 1 kB each; RAM++ knows 4585 tags, and questions bring ever new words
+MAX_TEXTS = 8192  # vectors kept, 1 kB each; RAM++ knows 4585 tags, and questions bring new words
 
 
 class TextEncoder:
@@ -26,7 +26,7 @@ class TextEncoder:
 
     def __init__(self, max_texts: int = MAX_TEXTS) -> None:
         """max_texts: how many vectors are kept, at least 1."""
-        self._most_texts = max_texts
+        self._max_texts = max_texts
         self._rows: OrderedDict[str, F32] = OrderedDict()
 
     def encode(self, texts: Sequence[str]) -> F32:
@@ -44,13 +44,13 @@ class TextEncoder:
         if text in self._rows:
             self._rows.move_to_end(text)
             return self._rows[text]
-        row = self._rows[text] = _encode_one(text)
-        if len(self._rows) > self._most_texts:
+        row = self._rows[text] = _encode_text(text)
+        if len(self._rows) > self._max_texts:
             self._rows.popitem(last=False)
         return row
 
 
-def _encode_one(text: str) -> F32:
+def _encode_text(text: str) -> F32:
     words = " ".join(text.split()).lower()  # the tokenizer gives "Couch" and "couch" unrelated tokens
     if not any(character.isalnum() for character in words):
         return np.zeros(DIMENSIONS, np.float32)

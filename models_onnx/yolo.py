@@ -1,4 +1,4 @@
-"""Read YOLOv8 and YOLO-World exports: decoded boxes and class scores in one tensor.
+"""YOLOv8 and YOLO-World exports: decoded boxes and class scores in one tensor.
 
 Source: the Ultralytics export layout: input (1, 3, S, S) RGB 0..1, letterboxed in the middle with grey 114; output
 (1, 4 + N, A) with cx cy w h in px of the input and N class probabilities. A prompted export (YOLO-World) has a second
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from placegraph.models_onnx import Boxes, boxes
-from placegraph.models_onnx.letterbox import Letterbox, fit
+from placegraph.models_onnx.letterbox import Letterbox, letterbox_image
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.text_encoder import DIMENSIONS, TextEncoder
@@ -29,7 +29,7 @@ class Options(ModelOptions):
 
 
 class FAMILY:
-    """A YOLO network as a Detector: of its own classes, or of the names asked for when the export takes text."""
+    """A YOLO network as a Detector: of its own classes, or of the names prompts for when the export takes text."""
 
     def __init__(self, weights: Weights, threads: int = 1) -> None:
         """Load and check the layout; raises ModelError when it is not such an export."""
@@ -49,26 +49,26 @@ class FAMILY:
             self._session.expect(outputs={self._output: (1, 4 + len(self._labels), "A")})
 
     def detect(self, image: U8, names: Sequence[str]) -> Boxes:
-        """Boxes of the names asked for (prompted), or of the network's own classes (`names` ignored).
+        """Boxes of the names prompts for (prompted), or of the network's own classes (`names` ignored).
 
         Raises:
             ModelError: the network cannot be run on this image, or gives another number of classes than names.
         """
-        asked = tuple(dict.fromkeys(names)) if self._text_input else self._labels
-        feed, placed = prepare(image, self._height, self._width)
+        prompts = tuple(dict.fromkeys(names)) if self._text_input else self._labels
+        feed, placed = prepare_input(image, self._height, self._width)
         centres = [np.zeros((0, 4), np.float32)]
         classes, scores = [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
-        step = self._slots or max(len(asked), 1)
-        for start in range(0, len(asked), step):
-            raw = self._run(feed, asked[start : start + step])
+        step = self._slots or max(len(prompts), 1)
+        for start in range(0, len(prompts), step):
+            raw = self._run(feed, prompts[start : start + step])
             anchors, part, best = boxes.best_classes(raw[:, 4:], self._options.min_score)
             centres.append(raw[anchors, :4])
             classes.append(part + start)
             scores.append(best)
-        found = placed.to_image(boxes.from_centres(np.concatenate(centres)))
+        found = placed.to_image(boxes.corners_from_centres(np.concatenate(centres)))
         which, best = np.concatenate(classes), np.concatenate(scores)
-        kept = boxes.suppress(found, best, which, self._options.nms_iou)
-        return boxes.named(asked, which[kept], found[kept], best[kept])
+        kept = boxes.non_maximum_suppression(found, best, which, self._options.nms_iou)
+        return boxes.named_boxes(prompts, which[kept], found[kept], best[kept])
 
     def _run(self, feed: F32, names: Sequence[str]) -> F32:
         """One pass for as many names as the export takes: (A, 4 + names)."""
@@ -94,9 +94,9 @@ class FAMILY:
         self._slots = sizes.get("N")
 
 
-def prepare(image: U8, height: int, width: int) -> tuple[F32, Letterbox]:
+def prepare_input(image: U8, height: int, width: int) -> tuple[F32, Letterbox]:
     """Letterbox (H, W, 3) in the middle and scale to 0..1: (1, 3, height, width), and where the image lies in it."""
-    canvas, placed = fit(image, height, width, centred=True)
+    canvas, placed = letterbox_image(image, height, width, centred=True)
     feed = canvas.transpose(2, 0, 1)[None].astype(np.float32) / np.float32(255)
     return np.ascontiguousarray(feed), placed
 

@@ -1,4 +1,4 @@
-"""Read YOLO-seg exports of one class, location: a bird's-eye image to masks with scores.
+"""YOLO-seg exports of one class, location: a bird's-eye image to masks with scores.
 
 Source: paper, "Location Detector Module" (YOLOv11 for instance segmentation, one class); the layout is yolo_seg.py's.
 """

@@ -1,4 +1,4 @@
-"""Read YOLOv8-seg exports: boxes, classes and masks from one pass; also masks for boxes that another network found.
+"""YOLOv8-seg exports: boxes, classes and masks in one pass, or masks for boxes that another network found.
 
 Source: the Ultralytics export layout: input as in yolo.py; output (1, 4 + C + 32, A) with cx cy w h, C class
 probabilities and 32 mask coefficients; prototypes (1, 32, h, w). A mask is the sigmoid of coefficients times
@@ -17,7 +17,7 @@ from placegraph.models_onnx import Boxes, Instances, Masks, boxes
 from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
-from placegraph.models_onnx.yolo import input_size, prepare
+from placegraph.models_onnx.yolo import input_size, prepare_input
 from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
 
@@ -28,7 +28,7 @@ class Options(ModelOptions):
     min_score: float = 0.1  # floor of the class probability
     nms_iou: float = 0.7  # Ultralytics default
     max_objects: int = 100  # masks made in one image; each costs .1 to .6 ms at 640 x 480
-    prompt_iou: float = 0.5  # a box given from outside needs an anchor that overlaps it at least so much
+    prompt_iou: float = 0.5  # a box of another network needs an anchor that overlaps it by this
     size: int = 640  # px, used where the export leaves its input size open; Ultralytics default
 
 
@@ -66,12 +66,12 @@ class FAMILY:
             ModelError: the network cannot be run on this image.
         """
         raw = self._run(image)
-        found, anchors = self._find(raw)
+        found, anchors = self._detections(raw)
         return Instances(found, [self._mask(raw, raw.coefficients[i], raw.boxes_px[i]) for i in anchors])
 
     def detect(self, image: U8, names: Sequence[str]) -> Boxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
-        return self._find(self._run(image))[0]
+        return self._detections(self._run(image))[0]
 
     def segment(self, image: U8, depth_m: F32, boxes_px: F32) -> Masks:
         """A mask for each box (N, 4) px: that of the anchor that fits it best, cut to the box; empty where none fits.
@@ -87,42 +87,42 @@ class FAMILY:
         certainty = raw.scores.max(axis=1)
         masks: Masks = []
         for box in boxes_px:
-            overlap = boxes.iou(box, raw.boxes_px)
-            fit = np.where(overlap >= self._options.prompt_iou, overlap * certainty, -1)
-            best = int(fit.argmax()) if len(fit) else -1
-            if best < 0 or fit[best] < 0:
+            overlap = boxes.box_iou(box, raw.boxes_px)
+            fitness = np.where(overlap >= self._options.prompt_iou, overlap * certainty, -1)
+            best = int(fitness.argmax()) if len(fitness) else -1
+            if best < 0 or fitness[best] < 0:
                 masks.append(np.zeros(image.shape[:2], bool))
             else:
                 masks.append(self._mask(raw, raw.coefficients[best], box))
         return masks
 
     def _run(self, image: U8) -> _Raw:
-        feed, placed = prepare(image, self._height, self._width)
+        feed, placed = prepare_input(image, self._height, self._width)
         outputs = self._session.run({self._input: feed})
         raw = np.asarray(outputs[self._boxes][0].T, np.float32)
         classes = len(self._labels)
         return _Raw(
-            placed.to_image(boxes.from_centres(raw[:, :4])),
+            placed.to_image(boxes.corners_from_centres(raw[:, :4])),
             raw[:, 4 : 4 + classes],
             raw[:, 4 + classes :],
             np.asarray(outputs[self._prototypes][0], np.float32),
             placed,
         )
 
-    def _find(self, raw: _Raw) -> tuple[Boxes, list[int]]:
+    def _detections(self, raw: _Raw) -> tuple[Boxes, list[int]]:
         """Named boxes and the anchor of each."""
         anchors, classes, scores = boxes.best_classes(raw.scores, self._options.min_score)
         solid = np.all(raw.boxes_px[anchors, 2:] > raw.boxes_px[anchors, :2], axis=1)
         anchors, classes, scores = anchors[solid], classes[solid], scores[solid]
         found = raw.boxes_px[anchors]
-        kept = boxes.suppress(found, scores, classes, self._options.nms_iou)[: self._options.max_objects]
-        return boxes.named(self._labels, classes[kept], found[kept], scores[kept]), anchors[kept].tolist()
+        kept = boxes.non_maximum_suppression(found, scores, classes, self._options.nms_iou)[: self._options.max_objects]
+        return boxes.named_boxes(self._labels, classes[kept], found[kept], scores[kept]), anchors[kept].tolist()
 
     def _mask(self, raw: _Raw, coefficients: F32, box_px: F32) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
         """Coefficients (M,) to a mask (H, W) of the image, cut to a box in px.
 
-        Departs: the logits are brought to image size in one bilinear step and only inside the box (the export's
-        reference code resizes to the input and then to the image); their sign is the sigmoid at .5.
+        Not as in the export's reference code, which resizes to the input and then to the image: the logits are resized
+        to the image in one bilinear step and only inside the box. Their sign is the sigmoid's threshold at .5.
         """
         placed, (_, rows, columns) = raw.placed, raw.prototypes.shape
         mask = np.zeros((placed.height, placed.width), bool)

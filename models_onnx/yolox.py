@@ -1,4 +1,4 @@
-"""Read YOLOX exports: raw head outputs on the grids of three strides. Fixed classes.
+"""YOLOX exports: raw head outputs on the grids of three strides. Fixed classes.
 
 Source: the layout of the official ONNX export (Megvii-BaseDetection/YOLOX, demo/ONNXRuntime): input (1, 3, S, S) BGR
 0..255, letterboxed top left with grey 114; output (1, A, 5 + C) with, per anchor, centre offset and log size in grid
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from placegraph.models_onnx import Boxes, boxes
-from placegraph.models_onnx.letterbox import fit
+from placegraph.models_onnx.letterbox import letterbox_image
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.runtime.arrays import F32, I64, U8
@@ -32,7 +32,7 @@ class FAMILY:
     """A YOLOX network as a Detector."""
 
     def __init__(self, weights: Weights, threads: int = 1) -> None:
-        """Load and check the layout; raises ModelError when it is not a YOLOX export."""
+        """Load and check the layout; raises ModelError when it is not such an export."""
         self._options = weights.parse_options(Options)
         self._labels = weights.class_names()
         self._session = Session(weights.file("model"), threads)
@@ -46,15 +46,15 @@ class FAMILY:
 
     def detect(self, image: U8, names: Sequence[str]) -> Boxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
-        canvas, placed = fit(image, self._height, self._width, centred=False)
+        canvas, placed = letterbox_image(image, self._height, self._width, centred=False)
         feed = canvas[:, :, ::-1].astype(np.float32).transpose(2, 0, 1)[None]
         raw = self._session.run({self._input: np.ascontiguousarray(feed)})[self._output][0]
         if len(raw) != len(self._cells):
             raise ModelError(f"{self._session.path}: {len(raw)} anchors, expected {len(self._cells)} of {STRIDES}")
         anchors, classes, scores = boxes.best_classes(raw[:, 4:5] * raw[:, 5:], self._options.min_score)
-        found = placed.to_image(boxes.from_centres(self._decode(raw[anchors, :4], anchors)))
-        kept = boxes.suppress(found, scores, classes, self._options.nms_iou)
-        return boxes.named(self._labels, classes[kept], found[kept], scores[kept])
+        found = placed.to_image(boxes.corners_from_centres(self._decode(raw[anchors, :4], anchors)))
+        kept = boxes.non_maximum_suppression(found, scores, classes, self._options.nms_iou)
+        return boxes.named_boxes(self._labels, classes[kept], found[kept], scores[kept])
 
     def _decode(self, raw: F32, anchors: I64) -> F32:
         """Grid offsets and log sizes (K, 4) to cx cy w h in px of the input."""

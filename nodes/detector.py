@@ -1,4 +1,4 @@
-"""Node: keyframe and tags to named boxes."""
+"""Node `detector`: keyframe and tags to named boxes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class DetectorConfig(NodeConfig):
     """Settings of the detector."""
 
     model: str  # a name of the manifest
-    min_score: float = Field(default=0.35, ge=0, le=1)  # measured on 7-Scenes: few false finds with YOLOX-nano
+    min_score: float = Field(default=0.35, ge=0, le=1)  # chosen on 7-Scenes: few false positives with YOLOX-nano
     max_objects: int = Field(default=50, ge=1)  # boxes kept of one image, best first; bounds the segmenter's time
     vocabulary: Annotated[tuple[str, ...], Field(strict=False)] = ()  # always looked for, besides the tags
 
@@ -58,14 +58,14 @@ class DetectorNode(Node):
 
     def _detect(self, keyframe: Keyframe, tags: Tags) -> Detections:
         names = tuple(dict.fromkeys((*tags.names, *self.config.vocabulary)))
-        found = self._model.detect(keyframe.color, names)
-        kept = np.flatnonzero(found.scores >= self.config.min_score)[: self.config.max_objects]
+        boxes = self._model.detect(keyframe.color, names)
+        kept = np.flatnonzero(boxes.scores >= self.config.min_score)[: self.config.max_objects]
         return Detections(
             frame_id=keyframe.frame_id,
             stamp_ns=keyframe.stamp_ns,
-            names=tuple(found.names[i] for i in kept.tolist()),
-            boxes_px=np.ascontiguousarray(found.boxes_px[kept], np.float32),
-            scores=np.ascontiguousarray(found.scores[kept], np.float32),
+            names=tuple(boxes.names[i] for i in kept.tolist()),
+            boxes_px=np.ascontiguousarray(boxes.boxes_px[kept], np.float32),
+            scores=np.ascontiguousarray(boxes.scores[kept], np.float32),
         )
 
 

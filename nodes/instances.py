@@ -1,4 +1,4 @@
-"""Node: keyframe to boxes and masks, by one network in one pass. It stands for tagger, detector and segmenter."""
+"""Node `instances`: keyframe to boxes and masks, by one network in place of tagger, detector and segmenter."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class InstancesConfig(NodeConfig):
     """Settings of the one-pass perception."""
 
     model: str  # a name of the manifest
-    min_score: float = Field(default=0.35, ge=0, le=1)  # measured on 7-Scenes with YOLOv8n-seg: few false finds
+    min_score: float = Field(default=0.35, ge=0, le=1)  # chosen on 7-Scenes: few false positives with YOLOv8n-seg
     max_objects: int = Field(default=50, ge=1)  # kept of one image, best first
     vocabulary: Annotated[tuple[str, ...], Field(strict=False)] = ()  # looked for by networks that take names
 
@@ -27,7 +27,7 @@ class InstancesConfig(NodeConfig):
 class InstancesNode(Node):
     """Find objects with their masks.
 
-    Departs: the paper runs three networks; this is the choice for machines too small for them.
+    Not as in the paper, which runs three networks: for machines that are too small for them.
     """
 
     config_type: ClassVar[type[NodeConfig]] = InstancesConfig
@@ -51,18 +51,18 @@ class InstancesNode(Node):
         """A Keyframe gives its Detections and its Segments, best first."""
         if not isinstance(message, Keyframe):
             raise TypeError(f"instances takes Keyframe, not {type(message).__name__}")
-        found = self._model.instances(message.color, self.config.vocabulary)
-        kept = np.flatnonzero(found.boxes.scores >= self.config.min_score)[: self.config.max_objects]
-        names = tuple(found.boxes.names[i] for i in kept.tolist())
-        scores = np.ascontiguousarray(found.boxes.scores[kept], np.float32)
+        instances = self._model.instances(message.color, self.config.vocabulary)
+        kept = np.flatnonzero(instances.boxes.scores >= self.config.min_score)[: self.config.max_objects]
+        names = tuple(instances.boxes.names[i] for i in kept.tolist())
+        scores = np.ascontiguousarray(instances.boxes.scores[kept], np.float32)
         detections = Detections(
             frame_id=message.frame_id,
             stamp_ns=message.stamp_ns,
             names=names,
-            boxes_px=np.ascontiguousarray(found.boxes.boxes_px[kept], np.float32),
+            boxes_px=np.ascontiguousarray(instances.boxes.boxes_px[kept], np.float32),
             scores=scores,
         )
-        return [detections, pack_segments(message, names, scores, [found.masks[i] for i in kept.tolist()])]
+        return [detections, pack_segments(message, names, scores, [instances.masks[i] for i in kept.tolist()])]
 
 
 NODE = InstancesNode

@@ -1,4 +1,4 @@
-"""Node: keyframe and boxes to masks."""
+"""Node `segmenter`: keyframe and boxes to masks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Node: keyframe to tags, the names of what the whole image shows."""
+"""Node `tagger`: keyframe to tags, the names of what the whole image shows."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ class TaggerNode(Node):
         """A Keyframe gives its Tags, best first."""
         if not isinstance(message, Keyframe):
             raise TypeError(f"tagger takes Keyframe, not {type(message).__name__}")
-        found = self._model.tag(message.color)
-        kept = np.flatnonzero(found.scores >= self.config.min_score)[: self.config.max_objects]
+        tags = self._model.tag(message.color)
+        kept = np.flatnonzero(tags.scores >= self.config.min_score)[: self.config.max_objects]
         return [
             Tags(
                 frame_id=message.frame_id,
                 stamp_ns=message.stamp_ns,
-                names=tuple(found.names[i] for i in kept.tolist()),
-                scores=np.ascontiguousarray(found.scores[kept], np.float32),
+                names=tuple(tags.names[i] for i in kept.tolist()),
+                scores=np.ascontiguousarray(tags.scores[kept], np.float32),
             )
         ]
 

@@ -14,7 +14,15 @@ from typing import Annotated
 import typer
 
 from placegraph.models_onnx.load import load
-from placegraph.models_onnx.manifest import WEIGHTS_DIR, FileEntry, Listed, entries, find_file, locate, sha256
+from placegraph.models_onnx.manifest import (
+    WEIGHTS_DIR,
+    FileEntry,
+    ManifestEntry,
+    find_file,
+    find_verified_file,
+    known_weights,
+    sha256,
+)
 from placegraph.runtime.errors import ModelError, PlacegraphError
 
 TIMEOUT_S = 30.0  # without a byte from the server
@@ -29,7 +37,7 @@ Target = Annotated[Path, typer.Option("--to", help="Folder that the files are wr
 @app.command("list")
 def list_weights(models: ModelDirs = None) -> None:
     """Show every known network: name, family, licence, size, and where its files were found."""
-    for name, listed in sorted(entries(models or ()).items()):
+    for name, listed in sorted(known_weights(models or ()).items()):
         entry = listed.entry
         megabytes = sum(file.size_bytes for file in entry.files.values()) / 1e6
         paths = {role: find_file(listed, role, models or ()) for role in entry.files}
@@ -45,7 +53,7 @@ def verify(
     models: ModelDirs = None,
 ) -> None:
     """Check the checksums of networks and that each loads as its family; exit code 1 if one does not."""
-    known = entries(models or ())
+    known = known_weights(models or ())
     failed = False
     for name in names or sorted(known):
         if not names and any(find_file(known[name], role, models or ()) is None for role in known[name].entry.files):
@@ -69,7 +77,7 @@ def import_weights(
     models: ModelDirs = None,
 ) -> None:
     """Copy the files of known networks out of a folder, after checking each against the manifest."""
-    for path in import_files(folder, to, entries(models or ())):
+    for path in import_files(folder, to, known_weights(models or ())):
         print(f"imported {path}")
 
 
@@ -78,18 +86,18 @@ def fetch(
     name: Annotated[str, typer.Argument(help="A known network.")], to: Target = WEIGHTS_DIR, models: ModelDirs = None
 ) -> None:
     """Download the files of a network that are not there yet; a broken download is resumed the next time."""
-    known = entries(models or ())
+    known = known_weights(models or ())
     if name not in known:
         raise ModelError(f"no weights named {name!r}; there are: {', '.join(sorted(known))}")
     listed = known[name]
     for role, file in listed.entry.files.items():
         if find_file(listed, role, (*(models or ()), to)) is not None:
-            print(f"present  {locate(listed, role, (*(models or ()), to))}")
+            print(f"present  {find_verified_file(listed, role, (*(models or ()), to))}")
         else:
             print(f"fetched  {fetch_file(name, file, to)}")
 
 
-def import_files(folder: Path, to: Path, known: Mapping[str, Listed]) -> list[Path]:
+def import_files(folder: Path, to: Path, known: Mapping[str, ManifestEntry]) -> list[Path]:
     """Copy every file of the known weights that lies in `folder` into `to`; returns the copies, sorted.
 
     Nothing is copied unless all of them are right.

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import typer
 
-from placegraph.nodes.camera import detect
+from placegraph.nodes.camera import detect_source
 from placegraph.runtime.arrays import U8, Bool
 from placegraph.runtime.config import read
 from placegraph.runtime.errors import ConfigError, SourceError
@@ -40,7 +40,7 @@ def perceive(
     nodes = [build_node(name, settings.nodes[name], context) for name in NETWORKS if name in settings.nodes]
     if not nodes:
         raise ConfigError(f"{config}: none of the nodes {', '.join(NETWORKS)} is in it")
-    chosen = list(islice(detect(str(source))(source, {}).frames(), 0, of, max(of // frames, 1)))[:frames]
+    chosen = list(islice(detect_source(str(source))(source, {}).frames(), 0, of, max(of // frames, 1)))[:frames]
     if not chosen:
         raise SourceError(f"{source}: the source gave no frame")
     for node in nodes:

@@ -30,9 +30,9 @@ WALK: dict[str, dict[str, Any]] = {
     "pose": {"stride": 4},
     "keyframe": {"translation_m": 0.05},
     "pose_graph": {  # so that it closes loops within a few steps of small images
-        "pull_m": 0.0,
-        "pull_rad": 0.0,
-        "loops": {"skip": 1, "apart": 1, "features": {"min_inliers": 10}},
+        "min_loop_error_m": 0.0,
+        "min_loop_error_rad": 0.0,
+        "loops": {"skip_newest": 1, "min_candidate_gap": 1, "features": {"min_inliers": 10}},
     },
 }
 HOUSE: dict[str, dict[str, Any]] = {

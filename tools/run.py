@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from placegraph.nodes.camera import detect
+from placegraph.nodes.camera import detect_source
 from placegraph.runtime.config import Dataflow, RunConfig, build, read
 from placegraph.runtime.errors import ConfigError, PlacegraphError
 from placegraph.runtime.health import StepStats
@@ -64,7 +64,7 @@ def source_settings(config: RunConfig, source: Path | None) -> dict[str, Any]:
         return {}
     changes: dict[str, Any] = {"path": str(source)}
     named = config.nodes.get("camera", {}).get("source", "auto")
-    if named != "auto" and named != detect(str(source)).__module__.rpartition(".")[2]:
+    if named != "auto" and named != detect_source(str(source)).__module__.rpartition(".")[2]:
         changes |= {"source": "auto", "settings": {}}
     return changes
 

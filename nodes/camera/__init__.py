@@ -1,6 +1,6 @@
-"""Node `camera`: frames from a device or a data set, and End after the last.
+"""Node `camera`: frames from a device or a data set, then End.
 
-One module per source, each exporting its class as SOURCE; found by file name.
+Each module of this folder reads one format or device and exports its class as SOURCE; it is found by its file name.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class CameraConfig(NodeConfig):
 
     source: str = "auto"  # a module of nodes/camera, or auto: the one whose format the path has
     path: str = ""
-    realtime: bool = False  # rehearse live use with a data set: frames come at their own pace and may be lost
+    realtime: bool = False  # play a data set as if it were live: frames come at their own pace and may be lost
     limit: int = Field(0, ge=0)  # stop after so many frames; 0 = all
     settings: dict[str, Any] = Field(default_factory=dict)  # the source's own, documented in its module
 
@@ -64,12 +64,12 @@ class Camera(Source):
     def __init__(self, config: CameraConfig, context: Context) -> None:
         super().__init__(config, context)
         path = Path(config.path)
-        kind = detect(config.path) if config.source == "auto" else find(config.source)
+        kind = detect_source(config.path) if config.source == "auto" else find_source(config.source)
         self.source: FrameSource = kind(path, dict(config.settings))
         self._clock_from_stamp_ns: int | None = None
 
     def is_lossless(self) -> bool:
-        """Whether every frame must arrive (data sets, recordings) or the newest wins (a device)."""
+        """Whether every frame must arrive (data sets, recordings); of a device's frames, old ones may be dropped."""
         return not (self.source.live or self.config.realtime)
 
     def _pace(self, stamp_ns: int) -> None:
@@ -80,7 +80,7 @@ class Camera(Source):
         time.sleep(max(0, stamp_ns + self._clock_from_stamp_ns - now_ns) / 1e9)
 
     def given_poses(self) -> dict[int, F64] | None:
-        """stamp_ns to (4, 4) world_from_camera that the data bring; None when they bring none."""
+        """stamp_ns to (4, 4) world_from_camera of the data set; None when it has none."""
         return self.source.given_poses()
 
     def messages(self) -> Iterator[Message]:
@@ -97,19 +97,19 @@ class Camera(Source):
                     break
         finally:
             if isinstance(frames, Generator):
-                frames.close()  # a device is let go now, not when the garbage is collected
+                frames.close()  # releases a device now, not when the garbage is collected
         if count == 0:
             raise SourceError(f"{self.config.path or self.config.source}: the source gave no frame")
         yield End(frame_id=last_id, stamp_ns=last_stamp, frames=count)
 
 
-def find(name: str) -> type[FrameSource]:
+def find_source(name: str) -> type[FrameSource]:
     """The SOURCE of a module of this folder; raises ConfigError naming the choices when there is none."""
-    found: type[FrameSource] = plugin(__name__, name, "SOURCE", "camera source")
-    return found
+    source: type[FrameSource] = plugin(__name__, name, "SOURCE", "camera source")
+    return source
 
 
-def detect(path: str) -> type[FrameSource]:
+def detect_source(path: str) -> type[FrameSource]:
     """The one source whose format a path has.
 
     Raises ConfigError when the path is empty or more than one format fits, SourceError when it is absent or none fits.
@@ -119,13 +119,13 @@ def detect(path: str) -> type[FrameSource]:
         raise ConfigError(f"[nodes.camera] path is empty: give a path, or a source: {', '.join([*names, *DEVICES])}")
     if not Path(path).exists():
         raise SourceError(f"{path}: no such file or folder")
-    sources = {name: find(name) for name in names}
+    sources = {name: find_source(name) for name in names}
     fits = [name for name, source in sources.items() if source.matches(Path(path))]
     if len(fits) > 1:
         raise ConfigError(f"{path}: fits more than one format; set source to one of: {', '.join(fits)}")
     if not fits:
-        looked = "".join(f"\n  {name}: {source.summary}" for name, source in sources.items())
-        raise SourceError(f"{path}: no known format; looked for:{looked}")
+        formats = "".join(f"\n  {name}: {source.summary}" for name, source in sources.items())
+        raise SourceError(f"{path}: no known format; looked for:{formats}")
     return sources[fits[0]]
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from placegraph.nodes.camera import _flat as scene
-from placegraph.nodes.camera._folder import SourceSettings, read_settings
+from placegraph.nodes.camera import _flat_scene as scene
+from placegraph.nodes.camera._dataset_reader import SourceSettings, read_settings
 from placegraph.runtime.arrays import F32, F64, I64, U8, U16
 from placegraph.runtime.messages import Frame
 
@@ -42,7 +42,7 @@ class Settings(SourceSettings):
 
 
 @dataclass(frozen=True)
-class Boxes:
+class SceneBoxes:
     """Every box of the scene: corners (B, 3) in metres, sRGB colour (B, 3), class and object (-1: the building)."""
 
     low: F32
@@ -60,7 +60,7 @@ class Flat:
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self.settings = read_settings(Settings, settings)
-        self.poses = scene.poses(self.settings.frames or scene.whole_walk()[1])
+        self.poses = scene.camera_poses(self.settings.frames or scene.sample_walk()[1])
         width, height = self.settings.width, self.settings.height
         focal = FOCAL_PER_WIDTH * width
         self.intrinsics = np.array([focal, focal, (width - 1) / 2, (height - 1) / 2])
@@ -113,7 +113,7 @@ class Flat:
 
 def truth() -> list[tuple[str, F64]]:
     """Every object of the scene: its class and box (2, 3), min and max in metres, world frame."""
-    return [(thing.name, thing.box) for thing in scene.OBJECTS]
+    return [(drawn.name, drawn.box) for drawn in scene.OBJECTS]
 
 
 def rooms() -> list[tuple[str, F64]]:
@@ -121,7 +121,7 @@ def rooms() -> list[tuple[str, F64]]:
     return [(name, np.array(span).reshape(2, 3)) for name, span in scene.ROOMS]
 
 
-def _boxes(seed: int) -> Boxes:
+def _boxes(seed: int) -> SceneBoxes:
     spans: list[scene.Span] = []
     colors: list[F64] = []
     labels: list[int] = []
@@ -132,14 +132,14 @@ def _boxes(seed: int) -> Boxes:
         labels.append(0)
         objects.append(-1)
     tints = np.random.default_rng([seed, 1 << 40]).normal(0.0, TINT, (len(scene.OBJECTS), 3))
-    for number, thing in enumerate(scene.OBJECTS):
-        for part in thing.parts:
+    for number, drawn in enumerate(scene.OBJECTS):
+        for part in drawn.parts:
             spans.append(part)
-            colors.append(np.clip(np.array(scene.COLORS[thing.name]) + tints[number], 8, 255))
-            labels.append(scene.CLASSES.index(thing.name))
+            colors.append(np.clip(np.array(scene.COLORS[drawn.name]) + tints[number], 8, 255))
+            labels.append(scene.CLASSES.index(drawn.name))
             objects.append(number)
     corners = np.array(spans, np.float32)
-    return Boxes(
+    return SceneBoxes(
         low=corners[:, :3],
         high=corners[:, 3:],
         color=np.array(colors, np.float32),
@@ -148,7 +148,9 @@ def _boxes(seed: int) -> Boxes:
     )
 
 
-def cast_rays(rays: F32, intrinsics: F64, world_from_camera: F64, boxes: Boxes) -> tuple[F32, NDArray[np.intp], U8]:
+def cast_rays(
+    rays: F32, intrinsics: F64, world_from_camera: F64, boxes: SceneBoxes
+) -> tuple[F32, NDArray[np.intp], U8]:
     """First box along each ray, by the slab test.
 
     rays: (H, W, 3), camera frame, z = 1. Returns depth (H, W) in metres (inf: nothing hit), the box (H, W) and the face
@@ -162,7 +164,7 @@ def cast_rays(rays: F32, intrinsics: F64, world_from_camera: F64, boxes: Boxes) 
     depth = np.full(rays.shape[:2], np.inf, np.float32)
     hit_box = np.zeros(rays.shape[:2], np.intp)
     hit_axis = np.zeros(rays.shape[:2], np.uint8)
-    for index, (x0, y0, x1, y1) in enumerate(_windows(intrinsics, world_from_camera, boxes, depth.shape)):
+    for index, (x0, y0, x1, y1) in enumerate(_pixel_windows(intrinsics, world_from_camera, boxes, depth.shape)):
         if x0 >= x1 or y0 >= y1:
             continue
         window = (slice(y0, y1), slice(x0, x1))
@@ -181,10 +183,12 @@ def cast_rays(rays: F32, intrinsics: F64, world_from_camera: F64, boxes: Boxes) 
     return depth, hit_box, (2 * hit_axis + far_face).astype(np.uint8)
 
 
-def _windows(intrinsics: F64, world_from_camera: F64, boxes: Boxes, size: tuple[int, ...]) -> list[list[int]]:
-    """Pixel window x0 y0 x1 y1 (max exclusive) that holds each box's picture; empty when it is behind the camera."""
-    chosen = (np.arange(8)[:, None] >> np.arange(3)) & 1  # (8, 3): which coordinates come from `high`
-    corners = np.where(chosen[None] == 1, boxes.high[:, None], boxes.low[:, None])
+def _pixel_windows(
+    intrinsics: F64, world_from_camera: F64, boxes: SceneBoxes, size: tuple[int, ...]
+) -> list[list[int]]:
+    """Pixel window x0 y0 x1 y1 (max exclusive) that each box is inside of; empty for boxes behind the camera."""
+    from_high = (np.arange(8)[:, None] >> np.arange(3)) & 1  # (8, 3): which coordinates come from `high`
+    corners = np.where(from_high[None] == 1, boxes.high[:, None], boxes.low[:, None])
     camera = (corners - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]  # (B, 8, 3)
     a, b = camera[:, EDGES[:, 0]], camera[:, EDGES[:, 1]]
     crosses = (a[..., 2] > NEAR_M) != (b[..., 2] > NEAR_M)
@@ -193,10 +197,10 @@ def _windows(intrinsics: F64, world_from_camera: F64, boxes: Boxes, size: tuple[
         cut = np.where(crosses[..., None], a + share * (b - a), np.nan)  # where edges pass the near plane
     ahead = np.where(camera[..., 2:] > NEAR_M, camera, np.nan)
     points = np.concatenate((ahead, cut), axis=1)
-    known = np.isfinite(points[..., 0])
+    is_known = np.isfinite(points[..., 0])
     pixels = points[..., :2] / points[..., 2:] * intrinsics[:2] + intrinsics[2:]
-    low = np.where(known[..., None], pixels, np.inf).min(axis=1)
-    high = np.where(known[..., None], pixels, -np.inf).max(axis=1)
+    low = np.where(is_known[..., None], pixels, np.inf).min(axis=1)
+    high = np.where(is_known[..., None], pixels, -np.inf).max(axis=1)
     limit = np.array([size[1], size[0]])
     first = np.clip(np.floor(low), 0, limit)
     last = np.clip(np.ceil(high) + 1, 0, limit)

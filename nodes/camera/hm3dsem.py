@@ -6,9 +6,9 @@ hovsg/dataloader/hm3dsem.py): in a scene's folder `rgb/SCENE_000000.png` and `de
 matrix, row by row. `semantic/` is not read. The sensor is habitat-sim's pinhole of 90 degrees in width.
 
 World and camera are habitat's: y up, and the camera looks along its -z. Both are turned here: the world about x, so
-that z is up, and the camera to x right, y down, z forward; so a pose also tells which way is up. A point (x, y, z) of
-HOV-SG's truth is at (x, -z, y) here. Departs: the image centre is at (W-1)/2, as pixel centres are whole numbers here;
-HOV-SG takes W/2, half a pixel off. Walks carry no times: frame numbers are turned into times.
+that z is up, and the camera to x right, y down, z forward; so a pose also gives which way is up. A point (x, y, z) of
+HOV-SG's truth is at (x, -z, y) here. Not as in HOV-SG, the image centre is at (W-1)/2, because pixel centres are whole
+numbers here; its W/2 is half a pixel off. Walks carry no times: frame numbers are turned into times.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._folder import (
+from placegraph.nodes.camera._dataset_reader import (
     SourceSettings,
     check_centre,
     check_intrinsics,
     check_same_frames,
-    numbered,
-    read_pair,
+    numbered_files,
+    read_color_and_depth,
     read_pose,
     read_settings,
 )
@@ -61,10 +61,10 @@ class Hm3dSem:
         self._settings = read_settings(Settings, settings)
         if not path.is_dir():
             raise SourceError(f"{path}: no such folder")
-        self._colors = numbered(path / "rgb", IMAGE)
+        self._colors = numbered_files(path / "rgb", IMAGE)
         if not self._colors:
             raise SourceError(f"{path / 'rgb'}: no SCENE_000000.png")
-        self._depths, self._poses = numbered(path / "depth", IMAGE), numbered(path / "pose", POSE)
+        self._depths, self._poses = numbered_files(path / "depth", IMAGE), numbered_files(path / "pose", POSE)
         check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
 
     @staticmethod
@@ -77,7 +77,7 @@ class Hm3dSem:
     def frames(self) -> Iterator[Frame]:
         """Frames by number. Raises SourceError naming the file that is missing or damaged."""
         for frame_id, (number, color_path) in enumerate(self._colors.items()):
-            color, depth = read_pair(color_path, self._depths[number])
+            color, depth = read_color_and_depth(color_path, self._depths[number])
             pose = _pose(self._poses[number])
             yield Frame(
                 frame_id=frame_id,
@@ -100,11 +100,10 @@ class Hm3dSem:
     def _intrinsics(self, size: tuple[int, int]) -> F64:
         height, width = size
         where = "[nodes.camera.settings] intrinsics"
-        by_setting = self._settings.intrinsics
         focal = width / 2  # 90 degrees; pixels are square
-        given = np.array(by_setting or [focal, focal, (width - 1) / 2, (height - 1) / 2])
-        check_centre(check_intrinsics(given, where), size, where)
-        return given
+        intrinsics = np.array(self._settings.intrinsics or [focal, focal, (width - 1) / 2, (height - 1) / 2])
+        check_centre(check_intrinsics(intrinsics, where), size, where)
+        return intrinsics
 
 
 def _pose(file: Path) -> F64:

@@ -18,7 +18,7 @@ import depthai as dai
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._folder import (
+from placegraph.nodes.camera._dataset_reader import (
     NO_POSE,
     NO_UP,
     SourceSettings,
@@ -43,12 +43,12 @@ class Settings(SourceSettings):
     width: int = Field(640, ge=64)
     height: int = Field(480, ge=64)
     rate_hz: float = Field(15.0, gt=0)  # enough for walking pace, little enough for a small computer
-    imu: bool = True  # tell which way is up by the accelerometer; false for a camera without one
+    imu: bool = True  # the accelerometer gives which way is up; false for a camera without one
     gravity_time_s: float = Field(1.0, gt=0)  # time constant of the low pass on the accelerometer
 
 
 class Oak:
-    """Frames of one camera until it is lost or nobody wants more."""
+    """Frames of one camera until it is lost or the run ends."""
 
     summary: ClassVar[str] = "no path: an OAK camera with stereo depth (source = 'oak')"
     live: ClassVar[bool] = True
@@ -72,7 +72,7 @@ class Oak:
             device.setMaxReconnectionAttempts(0)
             pipeline.setStopOnDeviceLoss(True)
             camera_from_imu = _camera_from_imu(device, info) if self._settings.imu else None
-            pairs, motion = build(pipeline, self._settings, camera_from_imu is not None)
+            pairs, motion = build_pipeline(pipeline, self._settings, camera_from_imu is not None)
             gravity = Gravity(self._settings.gravity_time_s)
             pipeline.start()
             frame_id = 0
@@ -120,24 +120,26 @@ class Gravity:
         return self._mean / length if length > 1.0 else NO_UP  # free fall: no direction
 
 
-def find_device(wanted: str) -> dai.DeviceInfo:
+def find_device(identifier: str) -> dai.DeviceInfo:
     """The connected camera of that id, name or address, or the only one; raises SourceError.
 
     Asking first takes half a second; opening without asking waits ten before it says that there is none.
     """
-    found = sorted(dai.Device.getAllAvailableDevices(), key=lambda info: str(info.deviceId))
-    listing = ", ".join(f"{info.deviceId} ({info.name})" for info in found)
-    if not found:
+    devices = sorted(dai.Device.getAllAvailableDevices(), key=lambda info: str(info.deviceId))
+    listing = ", ".join(f"{info.deviceId} ({info.name})" for info in devices)
+    if not devices:
         raise SourceError("no OAK camera found: check the cable, the power and (USB on Linux) the udev rules")
-    if not wanted and len(found) > 1:
+    if not identifier and len(devices) > 1:
         raise SourceError(f"several OAK cameras: set device in [nodes.camera.settings] to one of: {listing}")
-    for info in found:
-        if not wanted or wanted in (info.deviceId, info.name):
+    for info in devices:
+        if not identifier or identifier in (info.deviceId, info.name):
             return info
-    raise SourceError(f"no OAK camera {wanted!r}; there are: {listing}")
+    raise SourceError(f"no OAK camera {identifier!r}; there are: {listing}")
 
 
-def build(pipeline: dai.Pipeline, settings: Settings, imu: bool) -> tuple[dai.MessageQueue, dai.MessageQueue | None]:
+def build_pipeline(
+    pipeline: dai.Pipeline, settings: Settings, imu: bool
+) -> tuple[dai.MessageQueue, dai.MessageQueue | None]:
     """Wire the device: queues of colour and depth pairs, and of accelerometer samples where there is an IMU."""
     camera = pipeline.create(dai.node.Camera).build(COLOR_SOCKET)
     color = camera.requestOutput(

@@ -15,7 +15,7 @@ from placegraph.runtime.recording import kinds_in, read
 
 
 class RecordedFrames:
-    """Gives the recorded Frames again, exact, with their ids and capture times."""
+    """The recorded Frames, exact, with their ids and capture times."""
 
     summary: ClassVar[str] = "a recording FILE.rrd made with [nodes.recorder] frames = true"
     live: ClassVar[bool] = False

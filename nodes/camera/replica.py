@@ -3,8 +3,8 @@
 Source: github.com/cvg/nice-slam (scripts/download_replica.sh, src/utils/datasets.py, configs/Replica): in each scene's
 folder `results/frame000000.jpg`, `results/depth000000.png` and `traj.txt`, whose line N is frame N's camera-to-world
 matrix, row by row; beside the scenes `cam_params.json` with size, pinhole and depth steps a metre (1200x680, 6553.5).
-The camera has x right, y down, z forward (NICE-SLAM turns y and z round for itself, issue 10). The world is that of
-Replica's meshes, z up, so a pose also tells which way is up. Frames carry no times: numbers are turned into times.
+The camera has x right, y down, z forward (NICE-SLAM turns y and z round for itself, its issue 10). The world is that of
+Replica's meshes, z up, so a pose also gives which way is up. Frames carry no times: numbers are turned into times.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
-from placegraph.nodes.camera._folder import (
+from placegraph.nodes.camera._dataset_reader import (
     SourceSettings,
     check_centre,
     check_same_frames,
-    numbered,
-    read_pair,
+    numbered_files,
+    read_color_and_depth,
     read_settings,
     read_text,
 )
@@ -73,7 +73,7 @@ class Replica:
         if not path.is_dir():
             raise SourceError(f"{path}: no such folder")
         images = path / "results"
-        self._colors, self._depths = numbered(images, COLOR), numbered(images, DEPTH)
+        self._colors, self._depths = numbered_files(images, COLOR), numbered_files(images, DEPTH)
         if not self._colors:
             raise SourceError(f"{images}: no frame*.jpg")
         check_same_frames({"colour": self._colors, "depth": self._depths})
@@ -95,7 +95,7 @@ class Replica:
         intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
         check_centre(intrinsics, (camera.h, camera.w), str(self._camera_file))
         for frame_id, (number, color_path) in enumerate(self._colors.items()):
-            color, depth = read_pair(color_path, self._depths[number])
+            color, depth = read_color_and_depth(color_path, self._depths[number])
             if depth.shape != (camera.h, camera.w):
                 size = f"{depth.shape[1]}x{depth.shape[0]}"
                 raise SourceError(f"{color_path}: is {size}; {self._camera_file} says {camera.w}x{camera.h}")

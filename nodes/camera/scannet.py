@@ -2,14 +2,14 @@
 
 Source: Dai et al., "ScanNet", CVPR 2017; github.com/ScanNet/ScanNet, SensReader/python/SensorData.py (names, units,
 poses camera to world). A pose that was lost is all -inf. The world has z up (paper: scans and poses are aligned to "a
-common coordinate frame with the z-axis as the up vector"), so a pose also tells which way is up. Files carry no times:
+common coordinate frame with the z-axis as the up vector"), so a pose also gives which way is up. Files carry no times:
 frame numbers are turned into times.
 
 Colour (1296x968 in most scenes) is larger than depth (640x480), and each has its own pinhole with one centre and one
 direction: the maintainers say that the two are aligned and no extrinsic is to be applied (issues 2 and 92). A frame has
 depth's size and pinhole; depth stays as it is, and colour is drawn into that pinhole through both camera matrices, as
-SensReader colours its points (sensorData.h, saveToPointCloud). Departs: colour is averaged over a depth pixel, not one
-pixel picked, and where depth sees a few pixels more than colour, colour's edge is repeated instead of black.
+SensReader colours its points (sensorData.h, saveToPointCloud). Not as there: a depth pixel gets the mean of the colour
+pixels in it, not one of them, and where depth sees a few pixels more than colour, colour's edge is repeated.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._folder import (
+from placegraph.nodes.camera._dataset_reader import (
     SourceSettings,
     check_centre,
     check_same_frames,
-    numbered,
+    numbered_files,
     read_color,
     read_depth,
     read_pinhole,
@@ -41,7 +41,7 @@ from placegraph.runtime.messages import Frame
 COLOR, DEPTH, POSE = re.compile(r"(\d+)\.jpg"), re.compile(r"(\d+)\.png"), re.compile(r"(\d+)\.txt")
 # Fields of view of colour and depth are within some percent of each other. SensReader's image_size shrinks images but
 # not the camera matrices beside them: those are then off by the ratio of the sizes.
-LARGEST_VIEW_RATIO = 1.25
+MAX_VIEW_RATIO = 1.25
 
 
 class Settings(SourceSettings):
@@ -63,10 +63,10 @@ class ScanNet:
         self._settings = read_settings(Settings, settings)
         if not path.is_dir():
             raise SourceError(f"{path}: no such folder")
-        self._colors = numbered(path / "color", COLOR)
+        self._colors = numbered_files(path / "color", COLOR)
         if not self._colors:
             raise SourceError(f"{path / 'color'}: no N.jpg")
-        self._depths, self._poses = numbered(path / "depth", DEPTH), numbered(path / "pose", POSE)
+        self._depths, self._poses = numbered_files(path / "depth", DEPTH), numbered_files(path / "pose", POSE)
         check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
         self._color_file, self._depth_file = (
             path / "intrinsic" / f"intrinsic_{kind}.txt" for kind in ("color", "depth")
@@ -88,7 +88,7 @@ class ScanNet:
             yield Frame(
                 frame_id=frame_id,
                 stamp_ns=self._stamp_ns(number),
-                color=redraw(color, self._color_intrinsics, self._depth_intrinsics, depth.shape),
+                color=reproject_color(color, self._color_intrinsics, self._depth_intrinsics, depth.shape),
                 depth=depth,
                 depth_unit_m=0.001,  # SensReader/python/README.md: depth shift 1000
                 intrinsics=self._depth_intrinsics,
@@ -109,14 +109,14 @@ class ScanNet:
         check_centre(self._depth_intrinsics, depth_size, str(self._depth_file))
         check_centre(self._color_intrinsics, (height, width), str(self._color_file))
         view = (self._color_intrinsics[0] / width) / (self._depth_intrinsics[0] / depth_size[1])
-        if not 1 / LARGEST_VIEW_RATIO < view < LARGEST_VIEW_RATIO:
+        if not 1 / MAX_VIEW_RATIO < view < MAX_VIEW_RATIO:
             raise SourceError(
                 f"{color_path}: a {width}x{height} image does not fit {self._color_file.name}: colour would see "
                 f"{1 / view:.2f} times as wide as depth ({depth_size[1]}x{depth_size[0]}); was it resized?"
             )
 
 
-def redraw(color: U8, from_intrinsics: F64, to_intrinsics: F64, size: tuple[int, int]) -> U8:
+def reproject_color(color: U8, from_intrinsics: F64, to_intrinsics: F64, size: tuple[int, int]) -> U8:
     """The image that a camera in the same place with another pinhole sees.
 
     color: (H, W, 3) sRGB. Intrinsics: (4,) fx fy cx cy in px, of `color` and of the result. size: height and width of
@@ -132,8 +132,8 @@ def redraw(color: U8, from_intrinsics: F64, to_intrinsics: F64, size: tuple[int,
     shift = from_intrinsics[2:] - zoom * to_intrinsics[2:]
     source_from_result = np.column_stack((np.diag(zoom), shift))
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    drawn = cv2.warpAffine(color, source_from_result, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(drawn, np.uint8)
+    warped = cv2.warpAffine(color, source_from_result, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(warped, np.uint8)
 
 
 SOURCE = ScanNet

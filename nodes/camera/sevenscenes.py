@@ -15,13 +15,13 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._folder import (
+from placegraph.nodes.camera._dataset_reader import (
     NO_UP,
     SourceSettings,
     check_centre,
     check_intrinsics,
-    numbered,
-    read_pair,
+    numbered_files,
+    read_color_and_depth,
     read_pinhole,
     read_pose,
     read_settings,
@@ -53,7 +53,7 @@ class SevenScenes:
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self._settings = read_settings(Settings, settings)
         self._folder = _sequence(path)
-        self._colors = numbered(self._folder, FRAME)
+        self._colors = numbered_files(self._folder, FRAME)
         if not self._colors:
             raise SourceError(f"{self._folder}: no frame-*.color.jpg or .png")
         file = self._folder / "camera-intrinsics.txt"
@@ -67,14 +67,14 @@ class SevenScenes:
     def matches(path: Path) -> bool:
         """Whether the folder, or its only sequence, holds frame-*.color files."""
         try:
-            return bool(numbered(_sequence(path), FRAME))
+            return bool(numbered_files(_sequence(path), FRAME))
         except (SourceError, OSError):
             return False
 
     def frames(self) -> Iterator[Frame]:
         """Frames by number. Raises SourceError naming the file that is missing or damaged."""
         for frame_id, (number, color_path) in enumerate(self._colors.items()):
-            color, depth = read_pair(color_path, self._beside(color_path, "depth.png"))
+            color, depth = read_color_and_depth(color_path, self._beside(color_path, "depth.png"))
             check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
             depth[depth == NO_READING] = 0
             yield Frame(
@@ -108,7 +108,7 @@ def _sequence(path: Path) -> Path:
     if not path.is_dir():
         raise SourceError(f"{path}: no such folder")
     sequences = sorted(folder for folder in path.glob("seq-*") if folder.is_dir())
-    if not sequences or numbered(path, FRAME):
+    if not sequences or numbered_files(path, FRAME):
         return path
     if len(sequences) > 1:
         names = ", ".join(folder.name for folder in sequences)

@@ -1,4 +1,4 @@
-"""A whole house made by code, filmed on a walk through it as the frames are asked for: nothing is read from disk.
+"""A whole house made by code, rendered along a walk through it, frame by frame: nothing is read from disk.
 
 Equal settings give equal bytes. `placegraph house` writes the same frames, with their truth, as a folder.
 """
@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._folder import SourceSettings, read_settings
+from placegraph.nodes.camera._dataset_reader import SourceSettings, read_settings
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Frame
 from placegraph.runtime.node import plugin
@@ -39,7 +39,7 @@ class Synthetic:
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self.settings = read_settings(Settings, settings)
         # By name, as a plug-in: the generator is a tool, which a node must not import, and it needs libraries (ray
-        # casting) that no other node needs. Loaded here so that a missing one is told before the run starts.
+        # casting) that no other node needs. Loaded here so that a missing one is reported before the run starts.
         plugin("placegraph.tools.simulator", "render", "Renderer", "house generator")
         self._generator = plugin("placegraph.tools.simulator", "build", "HouseFrames", "house generator")
 
@@ -50,13 +50,13 @@ class Synthetic:
 
     def frames(self) -> Iterator[Frame]:
         """Frames along the walk."""
-        for made in self._house.frames():
-            pose = made.world_from_camera
+        for view in self._house.frames():
+            pose = view.world_from_camera
             yield Frame(
-                frame_id=made.frame_id,
-                stamp_ns=made.stamp_ns,
-                color=made.color,
-                depth=np.round(made.depth_m / DEPTH_UNIT_M).astype(np.uint16),
+                frame_id=view.frame_id,
+                stamp_ns=view.stamp_ns,
+                color=view.color,
+                depth=np.round(view.depth_m / DEPTH_UNIT_M).astype(np.uint16),
                 depth_unit_m=DEPTH_UNIT_M,
                 intrinsics=self._house.intrinsics.copy(),
                 given_world_from_camera=pose.copy(),

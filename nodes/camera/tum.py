@@ -2,7 +2,7 @@
 
 Source: Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012, and the data set's page on file
 formats (lists of `time file`, track of `time tx ty tz qx qy qz qw`, depth factor 5000, association by nearest time).
-The track's world has z up (the motion capture was levelled), so a given pose also tells which way is up.
+The track's world has z up (the motion capture was levelled), so a given pose also gives which way is up.
 The lenses of freiburg1 and freiburg2 distort by some pixels at the border; images are given as they are.
 """
 
@@ -18,13 +18,13 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation, Slerp
 
-from placegraph.nodes.camera._folder import (
+from placegraph.nodes.camera._dataset_reader import (
     NO_POSE,
     SourceSettings,
     check_centre,
     check_intrinsics,
+    read_color_and_depth,
     read_numbers,
-    read_pair,
     read_settings,
     read_text,
 )
@@ -89,7 +89,7 @@ class Tum:
     def frames(self) -> Iterator[Frame]:
         """Frames by colour time. Raises SourceError naming the file that is missing or damaged."""
         for frame_id, (stamp_ns, color_path, depth_path) in enumerate(self._pairs):
-            color, depth = read_pair(color_path, depth_path)
+            color, depth = read_color_and_depth(color_path, depth_path)
             check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
             pose = (self._poses or {}).get(stamp_ns, NO_POSE)
             yield Frame(
@@ -169,9 +169,9 @@ def _stamp_ns(file: Path, word: str) -> int:
 def _sorted_stamps(file: Path, rows: list[list[str]]) -> tuple[I64, list[list[str]]]:
     stamped = sorted((_stamp_ns(file, row[0]), row) for row in rows)
     stamps = np.array([stamp for stamp, _ in stamped], np.int64)
-    twice = np.flatnonzero(np.diff(stamps) == 0)
-    if twice.size:
-        raise SourceError(f"{file}: time {stamped[int(twice[0])][1][0]} appears twice")
+    repeated = np.flatnonzero(np.diff(stamps) == 0)
+    if repeated.size:
+        raise SourceError(f"{file}: time {stamped[int(repeated[0])][1][0]} appears twice")
     return stamps, [row for _, row in stamped]
 
 
@@ -198,7 +198,7 @@ def _read_track(file: Path) -> tuple[I64, F64]:
 
 
 def _poses_at(stamps: I64, track_ns: I64, track: F64, window_ns: int) -> dict[int, F64]:
-    """The track at each time: between its two neighbours where both are near enough, else the nearer if that is.
+    """The track interpolated at each time between its two neighbours; where only one is within the window, that one.
 
     Returns stamp_ns to (4, 4) world_from_camera; times that the track does not cover are left out.
     """

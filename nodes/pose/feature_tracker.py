@@ -1,9 +1,9 @@
-"""Corners tracked from image to image against the landmarks of a local map, and the surface of a reference view.
+"""Track corners from image to image, and register each image to their landmarks and to a reference view's surface.
 
-Each landmark is a corner with a position in the start frame, the mean of what its views say. Where an image has few
-corners, large patches of the last one are found again by their shades. Source: ours, after Nister 2004 (visual
-odometry), Lucas-Kanade tracks and KinectFusion's surface. Departs: KISS-ICP, by shape alone, slides along walls and
-drifts on a stereo camera's depth (README, "Results").
+A landmark is a corner with a position in the start frame: the mean over the views that showed it. Where few corners
+agree, large image patches of the last view are matched, too. Source: ours, after visual odometry (Nister 2004),
+Lucas-Kanade tracking and KinectFusion's surface. Not KISS-ICP alone, because a method that uses only shape slides along
+walls and drifts on a stereo camera's depth (docs/results.md).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from pydantic import BaseModel, Field
 
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool
 from placegraph.runtime.vision.geometry import transform
-from placegraph.runtime.vision.point_to_plane import Surface, SurfaceConfig, coarse_depth, scan_points
+from placegraph.runtime.vision.point_to_plane import SurfaceConfig, SurfaceMap, coarse_depth, scan_points
 from placegraph.runtime.vision.registration import (
-    Corners,
-    Laid,
-    Registered,
+    PointMatches,
     RegistrationConfig,
+    RegistrationResult,
+    SurfaceMatch,
     inverse_depth_at,
     project,
     rays,
@@ -30,26 +30,26 @@ from placegraph.runtime.vision.registration import (
 )
 
 
-class TrackConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """Distances and patches are those of an image 640 pixels wide and scale with it; windows of the search do not."""
+class FeatureTrackerConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+    """Corner distance and patch size hold for an image 640 px wide and scale with it; search windows do not."""
 
-    corners: int = Field(default=400, ge=20)
+    max_corners: int = Field(default=400, ge=20)
     corner_distance_px: float = 14.0
     corner_quality: float = 0.005  # of the strongest corner
     window_px: int = 21  # Lucas-Kanade
-    levels: int = 3
-    back_px: float = 1.0  # tracked back, a corner must come out so near to where it was
-    patches_below: int = 80  # corners that agree; with fewer, patches help
+    pyramid_levels: int = 3
+    max_forward_backward_px: float = 1.0  # a corner tracked back must end this near to where it started
+    min_corner_inliers: int = 80  # with fewer, patches are matched, too
     patch_px: int = 50
-    motion_sigma_m: float = 0.03  # a frame's motion departs from the last one's by so much
+    motion_sigma_m: float = 0.03  # difference between the motions of two successive frames
     turn_sigma_rad: float = 0.02
-    reference_share: float = 0.6  # of a view's points that must meet the reference, or it becomes the next one
+    min_reference_overlap: float = 0.6  # with less overlap, a view becomes the next reference
     registration: RegistrationConfig = RegistrationConfig()
     surface: SurfaceConfig = SurfaceConfig()
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class RgbdView:
     """One image: gray (H, W), depth (H, W) in metres with 0 = no reading, intrinsics fx fy cx cy in px."""
 
     gray: U8
@@ -58,29 +58,29 @@ class View:
 
     @cached_property
     def coarse_m(self) -> F32:
-        """Its depth on the grid of surfaces."""
+        """Depth on the grid of surfaces, see `coarse_depth`."""
         return coarse_depth(self.depth_m)
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
-    """A view's pose (4, 4) start_from_camera, how many corners and patches agree with it and their share."""
+class TrackedView:
+    """A view's pose (4, 4) start_from_camera and what agrees with it."""
 
     start_from_camera: F64
-    inliers: int
-    share: float
-    met: float  # share of the view's points that lie on the reference's surface
-    uv: F32  # (N, 2) of the landmarks that agree
-    landmarks: I64  # (N,) which those are
+    inliers: int  # corners and patches
+    inlier_share: float  # of those tracked
+    overlap: float  # share of the view's points that lie on the reference's surface
+    uv: F32  # (N, 2) px of the landmarks that agree
+    landmarks: I64  # (N,) their indices
 
 
-class Tracker:
-    """Landmarks where the last image showed them; `track` looks for them in a view, `accept` takes the view in."""
+class FeatureTracker:
+    """Landmarks and where the last view showed them. `track` finds a view's pose; `add_view` takes it as the last."""
 
-    def __init__(self, config: TrackConfig) -> None:
+    def __init__(self, config: FeatureTrackerConfig) -> None:
         self._config = config
-        self._last: tuple[View, F64] | None = None  # with its pose
-        self._reference: tuple[Surface, F64] | None = None
+        self._last: tuple[RgbdView, F64] | None = None  # with its pose
+        self._reference: tuple[SurfaceMap, F64] | None = None
         self._uv = np.zeros((0, 2), np.float32)
         self._xyz = np.zeros((0, 3))  # metres, start frame
         self._information = np.zeros(0)  # of the position: sum of 1 / depth^4 over views
@@ -88,72 +88,75 @@ class Tracker:
     def __len__(self) -> int:
         return len(self._uv)
 
-    def track(self, view: View, guess: F64) -> Track:
+    def track(self, view: RgbdView, guess: F64) -> TrackedView:
         """The pose of a view, near the predicted `guess` (4, 4) start_from_camera."""
-        c = self._config
-        uv, kept = self._follow(view, guess)
-        corners = Corners(self._xyz[kept], uv[kept], inverse_depth_at(view.depth_m, uv[kept]))
-        laid = self._reference and Laid(scan_points(view.coarse_m, view.intrinsics), *self._reference)
-        found = self._register(corners, laid, view, guess)
-        if found.inlier.sum() < c.patches_below:
-            corners_and_patches = corners.and_also(self._patches(view, guess))
-            found = self._register(corners_and_patches, laid, view, guess)
-        inlier = found.inlier[: len(corners)]
-        return Track(
-            start_from_camera=found.reference_from_camera,
-            inliers=int(found.inlier.sum()),
-            share=float(found.inlier.mean()) if len(found.inlier) else 0.0,
-            met=found.met,
-            uv=uv[kept][inlier],
-            landmarks=np.flatnonzero(kept)[inlier],
+        uv, is_tracked = self._track_corners(view, guess)
+        corners = PointMatches(self._xyz[is_tracked], uv[is_tracked], inverse_depth_at(view.depth_m, uv[is_tracked]))
+        surface_match = self._reference and SurfaceMatch(scan_points(view.coarse_m, view.intrinsics), *self._reference)
+        result = self._register(corners, surface_match, view, guess)
+        if result.is_inlier.sum() < self._config.min_corner_inliers:
+            matches = corners.joined_with(self._match_patches(view, guess))
+            result = self._register(matches, surface_match, view, guess)
+        is_inlier = result.is_inlier[: len(corners)]
+        return TrackedView(
+            start_from_camera=result.reference_from_camera,
+            inliers=int(result.is_inlier.sum()),
+            inlier_share=float(result.is_inlier.mean()) if len(result.is_inlier) else 0.0,
+            overlap=result.overlap,
+            uv=uv[is_tracked][is_inlier],
+            landmarks=np.flatnonzero(is_tracked)[is_inlier],
         )
 
-    def accept(self, view: View, start_from_camera: F64, track: Track | None = None) -> bool:
-        """Take in a view at its pose; without `track` the old landmarks are forgotten. Is it the new reference?"""
-        self._uv, kept = (track.uv, track.landmarks) if track else (self._uv[:0], np.zeros(0, np.int64))
+    def add_view(self, view: RgbdView, start_from_camera: F64, tracked: TrackedView | None = None) -> bool:
+        """Take a view at its pose as the last one; returns whether it has become the reference.
+
+        Landmarks that are not in `tracked` are forgotten; without it, all are.
+        """
+        self._uv, kept = (tracked.uv, tracked.landmarks) if tracked else (self._uv[:0], np.zeros(0, np.int64))
         self._xyz, self._information = self._xyz[kept], self._information[kept]
-        self._update(view, start_from_camera)
-        self._add_corners(view, start_from_camera)
+        self._update_landmarks(view, start_from_camera)
+        self._add_landmarks(view, start_from_camera)
         self._last = view, start_from_camera
-        if track is not None and track.met >= self._config.reference_share:
+        if tracked is not None and tracked.overlap >= self._config.min_reference_overlap:
             return False
-        self._reference = Surface(view.coarse_m, view.intrinsics, self._config.surface), start_from_camera
+        self._reference = SurfaceMap(view.coarse_m, view.intrinsics, self._config.surface), start_from_camera
         return True
 
-    def _register(self, corners: Corners, laid: Laid | None, view: View, guess: F64) -> Registered:
-        c = self._config
-        return register(corners, laid, view.intrinsics, guess, c.registration, (c.motion_sigma_m, c.turn_sigma_rad))
+    def _register(
+        self, matches: PointMatches, surface_match: SurfaceMatch | None, view: RgbdView, guess: F64
+    ) -> RegistrationResult:
+        sigmas = self._config.motion_sigma_m, self._config.turn_sigma_rad
+        return register(matches, surface_match, view.intrinsics, guess, self._config.registration, sigmas)
 
-    def _follow(self, view: View, guess: F64) -> tuple[F32, Bool]:
-        c = self._config
+    def _track_corners(self, view: RgbdView, guess: F64) -> tuple[F32, Bool]:
         if self._last is None or self._last[0].gray.shape != view.gray.shape or not len(self._uv):
             return self._uv, np.zeros(len(self._uv), bool)
         expected = project(self._xyz, view.intrinsics, guess)
         start = np.where(np.isfinite(expected), expected, self._uv).astype(np.float32)
-        return _tracked(self._last[0].gray, view.gray, self._uv, start, c.window_px, c)
+        return _track_points(self._last[0].gray, view.gray, self._uv, start, self._config.window_px, self._config)
 
-    def _patches(self, view: View, guess: F64) -> Corners:
-        """Patches of the last view, on a grid, found again in this one: a bare wall has shades but no corners."""
-        c = self._config
+    def _match_patches(self, view: RgbdView, guess: F64) -> PointMatches:
+        """Patches of the last view, on a grid, found in this one: a bare wall has shading but no corners."""
         if self._last is None or self._last[0].gray.shape != view.gray.shape:
-            return Corners(np.zeros((0, 3)), np.zeros((0, 2), np.float32), np.zeros(0))
+            return PointMatches(np.zeros((0, 3)), np.zeros((0, 2), np.float32), np.zeros(0))
         last, pose = self._last
         height, width = view.gray.shape
-        side = max(8, round(c.patch_px * width / 640))  # half of it is the least window that OpenCV takes
+        side = max(8, round(self._config.patch_px * width / 640))  # half of it is the least window that OpenCV takes
         v, u = np.mgrid[side // 2 : height : side, side // 2 : width : side]
         uv = np.stack((u.ravel(), v.ravel()), axis=1).astype(np.float32)
         inverse_depth = inverse_depth_at(last.depth_m, uv)
         uv, z = uv[inverse_depth > 0], 1 / inverse_depth[inverse_depth > 0]
         xyz = transform(pose, rays(uv, last.intrinsics) * z[:, None])
         if not len(uv):
-            return Corners(xyz, uv, z)
+            return PointMatches(xyz, uv, z)
         expected = project(xyz, view.intrinsics, guess)
         start = np.where(np.isfinite(expected), expected, uv).astype(np.float32) / np.float32(2)
-        found, kept = _tracked(_shades(last.gray), _shades(view.gray), uv / np.float32(2), start, side // 2, c)
-        found = found[kept] * np.float32(2)
-        return Corners(xyz[kept], found, inverse_depth_at(view.depth_m, found))
+        before, after = _normalised_shading(last.gray), _normalised_shading(view.gray)
+        half_uv, is_tracked = _track_points(before, after, uv / np.float32(2), start, side // 2, self._config)
+        view_uv = half_uv[is_tracked] * np.float32(2)
+        return PointMatches(xyz[is_tracked], view_uv, inverse_depth_at(view.depth_m, view_uv))
 
-    def _update(self, view: View, start_from_camera: F64) -> None:
+    def _update_landmarks(self, view: RgbdView, start_from_camera: F64) -> None:
         inverse_depth = inverse_depth_at(view.depth_m, self._uv)
         seen = inverse_depth > 1 / self._config.surface.max_depth_m
         z = 1 / inverse_depth[seen]
@@ -162,19 +165,19 @@ class Tracker:
         self._xyz[seen] += (xyz - self._xyz[seen]) * (z**-4.0 / total)[:, None]
         self._information[seen] = total
 
-    def _add_corners(self, view: View, start_from_camera: F64) -> None:
+    def _add_landmarks(self, view: RgbdView, start_from_camera: F64) -> None:
         c = self._config
-        wanted = c.corners - len(self._uv)
-        if wanted <= 0:
+        missing = c.max_corners - len(self._uv)
+        if missing <= 0:
             return
         free = ((view.depth_m > 0) & (view.depth_m < c.surface.max_depth_m)).astype(np.uint8) * np.uint8(255)
         distance = max(2.0, c.corner_distance_px * view.gray.shape[1] / 640)
         for u, v in self._uv.tolist():
             cv2.circle(free, (round(u), round(v)), round(distance), 0, -1)
-        found = cv2.goodFeaturesToTrack(view.gray, wanted, c.corner_quality, distance, mask=free)
-        if found is None:
+        corners = cv2.goodFeaturesToTrack(view.gray, missing, c.corner_quality, distance, mask=free)
+        if corners is None:
             return
-        uv = found.reshape(-1, 2).astype(np.float32)
+        uv = corners.reshape(-1, 2).astype(np.float32)
         inverse_depth = inverse_depth_at(view.depth_m, uv)
         uv, z = uv[inverse_depth > 0], 1 / inverse_depth[inverse_depth > 0]
         xyz = transform(start_from_camera, rays(uv, view.intrinsics) * z[:, None])
@@ -182,28 +185,35 @@ class Tracker:
         self._information = np.concatenate((self._information, z**-4.0))
 
 
-def _tracked(before: U8, now: U8, uv: F32, start: F32, window_px: int, c: TrackConfig) -> tuple[F32, Bool]:
-    """Where points (N, 2) of one image are in the next, sought from `start`; and which of them come back out."""
+def _track_points(
+    before: U8, after: U8, uv: F32, start: F32, window_px: int, config: FeatureTrackerConfig
+) -> tuple[F32, Bool]:
+    """Where points (N, 2) of one image are in the next, searched from `start`, and which of them track back."""
 
-    def flow(a: U8, b: U8, from_uv: F32, to_uv: F32) -> tuple[F32, Bool]:
-        uv, found, _ = cv2.calcOpticalFlowPyrLK(
-            a, b, from_uv, to_uv.copy(), winSize=(window_px, window_px), maxLevel=c.levels,
+    def optical_flow(a: U8, b: U8, from_uv: F32, to_uv: F32) -> tuple[F32, Bool]:
+        uv, status, _ = cv2.calcOpticalFlowPyrLK(
+            a,
+            b,
+            from_uv,
+            to_uv.copy(),
+            winSize=(window_px, window_px),
+            maxLevel=config.pyramid_levels,
             flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-        )  # fmt: skip
-        return np.asarray(uv, np.float32), np.asarray(found).ravel() == 1
+        )
+        return np.asarray(uv, np.float32), np.asarray(status).ravel() == 1
 
-    found, is_found = flow(before, now, uv, start)
-    back, is_back = flow(now, before, found, uv)
-    height, width = now.shape
-    inside = (found >= 0).all(axis=1) & (found[:, 0] <= width - 1) & (found[:, 1] <= height - 1)
-    near = np.linalg.norm(back - uv, axis=1) <= c.back_px
-    return found, is_found & is_back & inside & near
+    forward, is_forward = optical_flow(before, after, uv, start)
+    backward, is_backward = optical_flow(after, before, forward, uv)
+    height, width = after.shape
+    is_inside = (forward >= 0).all(axis=1) & (forward[:, 0] <= width - 1) & (forward[:, 1] <= height - 1)
+    is_near = np.linalg.norm(backward - uv, axis=1) <= config.max_forward_backward_px
+    return forward, is_forward & is_backward & is_inside & is_near
 
 
-def _shades(gray: U8) -> U8:
-    """Half the size: shades without grain and without what is wider than a patch, over the contrast around them.
+def _normalised_shading(gray: U8) -> U8:
+    """The image at half size without grain and without slow changes, divided by the contrast around each pixel.
 
-    A lens' vignette would else stand still while the wall passes.
+    Otherwise a lens's vignette, which does not move, would dominate a moving bare wall.
     """
     small = cv2.resize(gray, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA).astype(np.float32)
     high = cv2.GaussianBlur(small, (0, 0), 1.0) - cv2.GaussianBlur(small, (0, 0), 15.0)

@@ -1,6 +1,6 @@
-"""KISS-ICP, composed so that a scan that does not fit is never put into its map (the only kiss_icp import).
+"""Odometry by shape alone: KISS-ICP, whose map never takes a scan that does not fit it (the only kiss_icp import).
 
-Source: KISS-ICP (Vizzo 2023), its pipeline's order; departs: each scan is judged before the map is updated.
+Source: KISS-ICP (Vizzo 2023), the order of its pipeline. Not as there: each scan is judged before the map is updated.
 """
 
 from __future__ import annotations
@@ -13,14 +13,19 @@ from kiss_icp.kiss_icp import KissICP
 from pydantic import Field
 from scipy.spatial import KDTree
 
-from placegraph.nodes.pose.motion_model import stretched
+from placegraph.nodes.pose.motion_model import extrapolate_motion
 from placegraph.runtime.arrays import F32, F64
 from placegraph.runtime.node import NodeConfig
 from placegraph.runtime.vision.geometry import transform
 
+# chosen by hand
+TREE_PERIOD = 10  # frames between rebuilds of the search tree that judges the fit
+MIN_FIT_OF_OLD_TREE = 0.8  # a worse fit is judged again with a tree of the whole map
+MAX_JUDGED_POINTS = 1000
 
-class OdometryConfig(NodeConfig):
-    """Values for an indoor depth camera; measured on 7-Scenes (README, "Results")."""
+
+class KissIcpConfig(NodeConfig):
+    """Values for an indoor depth camera, chosen on 7-Scenes (docs/results.md)."""
 
     min_range_m: float = 0.2
     max_range_m: float = 6.0
@@ -28,28 +33,24 @@ class OdometryConfig(NodeConfig):
     max_points_per_voxel: int = 20
     initial_threshold_m: float = 0.3  # KISS-ICP's 2.0 is for cars
     min_motion_m: float = 0.02
-    min_points: int = 200  # fewer: a covered lens, a white wall too near
+    min_points: int = 200  # with fewer, the lens is covered or a white wall too near
     min_quality: float = 0.25  # share of the scan that must lie on the map; a step through a doorway leaves a third
-    relock_quality: float = 0.7  # share needed to go on after a lost track: a wrong place fits halfway, too
-    max_innovation_m: float = 0.3  # a hand-held camera does not depart further from constant motion in one frame
+    relock_quality: float = 0.7  # min_quality after a lost track: a wrong place fits halfway, too
+    max_innovation_m: float = 0.3  # in one frame, from constant motion; a hand-held camera changes its motion by less
     seed: int = 0
 
 
-class Odometry:
-    """KISS-ICP against its local map; what does not fit is reported and left out of it."""
+class KissIcpOdometry:
+    """Poses of successive scans; a scan that does not fit the local map is reported and left out of it."""
 
-    TREE_PERIOD = 10  # frames between rebuilds of the search tree that judges the fit
-    FRESH_TREE_BELOW = 0.8  # a worse fit is judged again with a tree of the whole map
-    JUDGED_POINTS = 1000
-
-    def __init__(self, config: OdometryConfig, threads: int) -> None:
+    def __init__(self, config: KissIcpConfig, threads: int) -> None:
         self._config = config
         self._kiss = KissICP(_kiss_config(config, threads))
         self._tree: KDTree | None = None
-        self._tree_age = 0  # frames put into the map since the tree was grown
+        self._tree_age = 0  # frames put into the map since the tree was built
         self._is_lost = False
         self._stamp_ns: int | None = None
-        self._span_ns = 0  # between the two frames that `last_delta` lies between
+        self._delta_span_ns = 0  # time between the two frames of `last_delta`
         self._random = np.random.default_rng(config.seed)
 
     def register(self, points: F32, stamp_ns: int) -> dict[str, Any]:
@@ -61,7 +62,7 @@ class Odometry:
         scan = kiss.preprocessor.preprocess(points.astype(np.float64), np.zeros(len(points)), kiss.last_delta)
         source, downsampled = kiss.voxelize(scan)
         sigma = kiss.adaptive_threshold.get_threshold()
-        guess = kiss.last_pose @ stretched(kiss.last_delta, span_ns, self._span_ns)
+        guess = kiss.last_pose @ extrapolate_motion(kiss.last_delta, span_ns, self._delta_span_ns)
         pose = kiss.registration.align_points_to_map(
             points=source,
             voxel_map=kiss.local_map,
@@ -71,11 +72,11 @@ class Odometry:
         )
         innovation = np.linalg.inv(guess) @ pose
         innovation_m = float(np.linalg.norm(innovation[:3, 3]))
-        in_start = transform(pose, np.asarray(source))
-        quality, residual_m = self._fit(in_start)
-        if quality < self.FRESH_TREE_BELOW and self._tree_age:
-            self._grow_tree()
-            quality, residual_m = self._fit(in_start)
+        xyz_start = transform(pose, np.asarray(source))
+        quality, residual_m = self._fit(xyz_start)
+        if quality < MIN_FIT_OF_OLD_TREE and self._tree_age:
+            self._build_tree()
+            quality, residual_m = self._fit(xyz_start)
         measured = {"quality": quality, "residual_m": residual_m, "innovation_m": innovation_m}
         if self._tree is not None:
             if quality < (self._config.relock_quality if self._is_lost else self._config.min_quality):
@@ -86,43 +87,38 @@ class Odometry:
         kiss.local_map.update(downsampled, pose)
         kiss.last_delta = np.linalg.inv(kiss.last_pose) @ pose
         kiss.last_pose = pose
-        self._span_ns = span_ns
+        self._delta_span_ns = span_ns
         self._tree_age += 1
-        if self._tree is None or self._tree_age >= self.TREE_PERIOD:
-            self._grow_tree()
+        if self._tree is None or self._tree_age >= TREE_PERIOD:
+            self._build_tree()
         self._is_lost = False
         return {"world_from_camera": pose, "trusted": True, "reason": "", **measured}
 
-    def _grow_tree(self) -> None:
+    def _build_tree(self) -> None:
         self._tree, self._tree_age = KDTree(self._kiss.local_map.point_cloud()), 0
 
     def _fit(self, xyz: F64) -> tuple[float, float]:
         """Share of points with a map point within 1.5 voxels, and the median distance of those (metres)."""
         if self._tree is None or len(xyz) == 0:
             return 1.0, float("nan")
-        if len(xyz) > self.JUDGED_POINTS:
-            xyz = xyz[self._random.choice(len(xyz), self.JUDGED_POINTS, replace=False)]
+        if len(xyz) > MAX_JUDGED_POINTS:
+            xyz = xyz[self._random.choice(len(xyz), MAX_JUDGED_POINTS, replace=False)]
         distances, _ = self._tree.query(xyz, distance_upper_bound=1.5 * self._config.voxel_m)
-        near = distances[np.isfinite(distances)]
-        return len(near) / len(xyz), float(np.median(near)) if len(near) else float("nan")
+        distances = distances[np.isfinite(distances)]
+        return len(distances) / len(xyz), float(np.median(distances)) if len(distances) else float("nan")
 
     def _lost(self, reason: str, measured: dict[str, float] | None = None) -> dict[str, Any]:
         """Stay at the last trusted pose and try again from there with the next frame."""
         self._kiss.last_delta = np.eye(4)
         self._is_lost = True
-        nothing = {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}
-        return {
-            "world_from_camera": self._kiss.last_pose,
-            "trusted": False,
-            "reason": reason,
-            **(measured or nothing),
-        }
+        measured = measured or {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}
+        return {"world_from_camera": self._kiss.last_pose, "trusted": False, "reason": reason, **measured}
 
 
-def _kiss_config(config: OdometryConfig, threads: int) -> KISSConfig:
+def _kiss_config(config: KissIcpConfig, threads: int) -> KISSConfig:
     kiss = KISSConfig()
     kiss.data.max_range, kiss.data.min_range = config.max_range_m, config.min_range_m
-    kiss.data.deskew = False  # a depth image has one time; deskewing equal times aborts the process (FACTS 5)
+    kiss.data.deskew = False  # a depth image has one time; KISS-ICP aborts the process when it deskews equal times
     kiss.mapping.voxel_size = config.voxel_m
     kiss.mapping.max_points_per_voxel = config.max_points_per_voxel
     kiss.registration.max_num_threads = threads

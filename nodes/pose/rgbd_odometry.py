@@ -1,8 +1,9 @@
-"""Odometry by colour and depth, judged frame by frame; a lost track is found again at a place seen before.
+"""Odometry by colour and depth that judges each frame and relocalises a lost camera at a view it has seen before.
 
-A frame is trusted when enough of what is tracked agrees on its pose. Through a frame or a few that are not (a bare
-wall, a swift turn) the predicted motion is kept up, held by the surface. A camera that coasts for too long, or whose
-frame shows another place altogether (it was carried), is lost until it recognises where it is.
+A frame is trusted when enough of what is tracked agrees on its pose. Through a few frames where too little agrees (a
+bare wall, a fast turn) the predicted motion is continued, corrected by the surface alone: the camera coasts. After
+coasting for too long, or when a frame shows a different place altogether (the camera was carried), the camera is lost
+until one of the remembered views is recognised.
 """
 
 from __future__ import annotations
@@ -13,122 +14,127 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from placegraph.nodes.pose.feature_tracker import TrackConfig, Tracker, View
-from placegraph.nodes.pose.motion_model import stretched
+from placegraph.nodes.pose.feature_tracker import FeatureTracker, FeatureTrackerConfig, RgbdView
+from placegraph.nodes.pose.motion_model import extrapolate_motion
 from placegraph.runtime.arrays import F64
-from placegraph.runtime.vision.features import FeatureConfig, Features, describe, relate
+from placegraph.runtime.vision.features import FeatureConfig, ViewFeatures, extract_features, match_views
 from placegraph.runtime.vision.geometry import inverse, nearest_rigid
 
-MIN_CELLS = 300  # of coarse depth, for the surface to have a say
-NOTHING = {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}  # measured of a frame that was not tracked
+MIN_DEPTH_CELLS = 300  # cells of coarse depth; with fewer the camera is covered and the surface says nothing
+NOT_TRACKED = {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}
 
 
-class RgbdConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """When a pose is trusted. Departs: with these every wrong pose of a house's walk at 10 and 3.3 Hz was told."""
+class RgbdOdometryConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+    """When a pose is trusted: chosen so that every wrong pose of the house walks at 10 and 3.3 Hz is reported."""
 
     min_inliers: int = Field(default=20, ge=6)  # corners and patches that agree
-    min_share: float = Field(default=0.15, gt=0)  # of those tracked
-    coast_s: float = Field(default=1.0, ge=0)  # a motion may be kept up so long
-    # of the view's points on the reference's surface: what neither corners nor this explain is another place
-    # On bare walls and in swift turns it was .43 at least
-    min_met: float = Field(default=0.35, ge=0, le=1)
-    places: int = Field(default=200, ge=1)  # views kept to be recognised, the newest
-    tries: int = Field(default=12, ge=1)  # of them looked at for each frame of a lost track
-    track: TrackConfig = TrackConfig()
+    min_inlier_share: float = Field(default=0.15, gt=0)  # of those tracked
+    max_coasting_s: float = Field(default=1.0, ge=0)
+    # With fewer inliers than above and less overlap with the reference's surface than this, the frame shows another
+    # place. On bare walls and in fast turns of those walks the overlap was .43 at least.
+    min_overlap: float = Field(default=0.35, ge=0, le=1)
+    max_remembered_views: int = Field(default=200, ge=1)  # the newest; a lost camera is looked for among them
+    max_candidates: int = Field(default=12, ge=1)  # remembered views compared with each frame of a lost camera
+    track: FeatureTrackerConfig = FeatureTrackerConfig()
     features: FeatureConfig = FeatureConfig()
 
 
 class RgbdOdometry:
-    """Poses of views, one after the other; the start frame is the first camera."""
+    """Poses of successive views in the start frame, that of the first camera."""
 
-    def __init__(self, config: RgbdConfig) -> None:
+    def __init__(self, config: RgbdOdometryConfig) -> None:
         self._config = config
-        self._tracker = Tracker(config.track)
+        self._tracker = FeatureTracker(config.track)
         self._pose = np.eye(4)
         self._delta = np.eye(4)  # the last motion
+        self._delta_span_ns = 0  # time between the two frames of `_delta`
         self._stamp_ns: int | None = None
-        self._span_ns = 0  # between the two frames that `_delta` lies between
-        self._since_ns: int | None = None  # the last trusted frame's stamp, once one was not
-        self._started = self._is_lost = False
-        self._places: deque[tuple[Features, F64]] = deque(maxlen=config.places)
-        self._turn = 0  # of the search through all places
+        self._coasting_since_ns: int | None = None  # stamp of the last trusted frame; None while frames are trusted
+        self._has_started = self._is_lost = False
+        self._remembered: deque[tuple[ViewFeatures, F64]] = deque(maxlen=config.max_remembered_views)
+        self._next_candidate = 0  # where the search through all remembered views goes on
 
-    def register(self, view: View, stamp_ns: int) -> dict[str, Any]:
+    def register(self, view: RgbdView, stamp_ns: int) -> dict[str, Any]:
         """Fields of the Pose for one view."""
         span_ns, last_ns = stamp_ns - (self._stamp_ns or stamp_ns), self._stamp_ns
         self._stamp_ns = stamp_ns
-        if not self._started:
+        if not self._has_started:
             return self._start(view)
-        if self._is_lost or (self._since_ns is not None and (stamp_ns - self._since_ns) * 1e-9 > self._config.coast_s):
-            return self._search(view)
-        guess = nearest_rigid(self._pose @ stretched(self._delta, span_ns, self._span_ns))
-        track = self._tracker.track(view, guess)
-        pose, c = track.start_from_camera, self._config
+        if self._is_lost or self._has_coasted_too_long(stamp_ns):
+            return self._relocalise(view)
+        guess = nearest_rigid(self._pose @ extrapolate_motion(self._delta, span_ns, self._delta_span_ns))
+        tracked = self._tracker.track(view, guess)
+        pose, c = tracked.start_from_camera, self._config
         measured = {
-            "quality": track.share,
+            "quality": tracked.inlier_share,
             "residual_m": float("nan"),
             "innovation_m": float(np.linalg.norm((inverse(guess) @ pose)[:3, 3])),
         }
-        if track.inliers < c.min_inliers or track.share < c.min_share:
-            is_blind = np.count_nonzero(view.coarse_m) < MIN_CELLS  # covered: tells nothing, and is not tracked from
-            if track.met < c.min_met and not is_blind:
-                return self._search(view)
-            self._since_ns = last_ns if self._since_ns is None else self._since_ns
-            self._move(pose, span_ns)
-            if not is_blind:
-                self._tracker.accept(view, pose, track)
-            return self._untrusted(f"{track.inliers} of the tracked corners agree ({track.share:.0%})", measured)
-        if self._since_ns is not None:  # coasted: does an earlier view tell how far it went astray?
-            self._since_ns = None
-            recognised = self._recognise(view, list(self._places)[: -c.tries - 1 : -1])
+        if tracked.inliers < c.min_inliers or tracked.inlier_share < c.min_inlier_share:
+            is_covered = np.count_nonzero(view.coarse_m) < MIN_DEPTH_CELLS
+            if tracked.overlap < c.min_overlap and not is_covered:
+                return self._relocalise(view)
+            self._coasting_since_ns = last_ns if self._coasting_since_ns is None else self._coasting_since_ns
+            self._move_to(pose, span_ns)
+            if not is_covered:
+                self._tracker.add_view(view, pose, tracked)
+            reason = f"{tracked.inliers} of the tracked corners agree ({tracked.inlier_share:.0%})"
+            return self._untrusted(reason, measured)
+        if self._coasting_since_ns is not None:  # has coasted, perhaps astray: a remembered view corrects that
+            self._coasting_since_ns = None
+            recognised = self._recognise(view, list(self._remembered)[: -c.max_candidates - 1 : -1])
             if recognised is not None:
-                self._pose, self._delta, self._span_ns = recognised, inverse(self._pose) @ pose, span_ns
-                self._tracker.accept(view, recognised)
+                self._delta, self._pose, self._delta_span_ns = inverse(self._pose) @ pose, recognised, span_ns
+                self._tracker.add_view(view, recognised)
                 return _trusted(recognised, measured)
-        self._move(pose, span_ns)
-        if self._tracker.accept(view, pose, track):
+        self._move_to(pose, span_ns)
+        if self._tracker.add_view(view, pose, tracked):
             self._remember(view)
         return _trusted(pose, measured)
 
-    def _start(self, view: View) -> dict[str, Any]:
-        self._tracker.accept(view, self._pose)
+    def _start(self, view: RgbdView) -> dict[str, Any]:
+        self._tracker.add_view(view, self._pose)
         if len(self._tracker) < self._config.min_inliers:
-            return self._untrusted(f"{len(self._tracker)} corners with depth to begin with", NOTHING)
-        self._started = True
+            return self._untrusted(f"{len(self._tracker)} corners with depth to begin with", NOT_TRACKED)
+        self._has_started = True
         self._remember(view)
-        return _trusted(self._pose, NOTHING | {"quality": 1.0})
+        return _trusted(self._pose, NOT_TRACKED | {"quality": 1.0})
 
-    def _search(self, view: View) -> dict[str, Any]:
-        """Look for a lost camera among the places: the newest ones first, then in turn through all of them."""
-        places, c, self._is_lost = list(self._places), self._config, True
-        newest = places[: -(c.tries // 2) - 1 : -1]
-        others = [places[(self._turn + k) % len(places)] for k in range(c.tries - len(newest))]
-        self._turn += len(others)
+    def _has_coasted_too_long(self, stamp_ns: int) -> bool:
+        since_ns = self._coasting_since_ns
+        return since_ns is not None and (stamp_ns - since_ns) * 1e-9 > self._config.max_coasting_s
+
+    def _relocalise(self, view: RgbdView) -> dict[str, Any]:
+        """Look for a lost camera among the remembered views: half of them the newest, half all others in turn."""
+        views, c, self._is_lost = list(self._remembered), self._config, True
+        newest = views[: -(c.max_candidates // 2) - 1 : -1]
+        others = [views[(self._next_candidate + k) % len(views)] for k in range(c.max_candidates - len(newest))]
+        self._next_candidate += len(others)
         pose = self._recognise(view, [*newest, *others])
         if pose is None:
-            return self._untrusted("lost: no place seen before is recognised", NOTHING)
+            return self._untrusted("lost: no place seen before is recognised", NOT_TRACKED)
         jump_m = float(np.linalg.norm(pose[:3, 3] - self._pose[:3, 3]))
-        self._pose, self._delta, self._span_ns, self._since_ns = pose, np.eye(4), 0, None
-        self._is_lost = False
-        self._tracker.accept(view, pose)
-        return _trusted(pose, NOTHING | {"quality": 1.0, "innovation_m": jump_m})
+        self._pose, self._delta, self._delta_span_ns = pose, np.eye(4), 0
+        self._coasting_since_ns, self._is_lost = None, False
+        self._tracker.add_view(view, pose)
+        return _trusted(pose, NOT_TRACKED | {"quality": 1.0, "innovation_m": jump_m})
 
-    def _recognise(self, view: View, places: list[tuple[Features, F64]]) -> F64 | None:
-        if not places:
+    def _recognise(self, view: RgbdView, candidates: list[tuple[ViewFeatures, F64]]) -> F64 | None:
+        if not candidates:
             return None
-        seen = describe(view.gray, view.depth_m, view.intrinsics, self._config.features)
-        for features, pose in places:
-            found = relate(features, seen, self._config.features)
-            if found is not None:
-                return nearest_rigid(pose @ found.reference_from_camera)
+        features = extract_features(view.gray, view.depth_m, view.intrinsics, self._config.features)
+        for remembered, pose in candidates:
+            match = match_views(remembered, features, self._config.features)
+            if match is not None:
+                return nearest_rigid(pose @ match.reference_from_camera)
         return None
 
-    def _remember(self, view: View) -> None:
-        seen = describe(view.gray, view.depth_m, view.intrinsics, self._config.features)
-        self._places.append((seen, self._pose))
+    def _remember(self, view: RgbdView) -> None:
+        features = extract_features(view.gray, view.depth_m, view.intrinsics, self._config.features)
+        self._remembered.append((features, self._pose))
 
-    def _move(self, pose: F64, span_ns: int) -> None:
-        self._delta, self._pose, self._span_ns = inverse(self._pose) @ pose, pose, span_ns
+    def _move_to(self, pose: F64, span_ns: int) -> None:
+        self._delta, self._pose, self._delta_span_ns = inverse(self._pose) @ pose, pose, span_ns
 
     def _untrusted(self, reason: str, measured: dict[str, float]) -> dict[str, Any]:
         return {"world_from_camera": self._pose, "trusted": False, "reason": reason, **measured}

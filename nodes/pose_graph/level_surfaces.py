@@ -1,6 +1,6 @@
-"""Which way is up by the level surfaces of a view: floors, tables, seats.
+"""Which way is up, by the level surfaces of a view: floors, tables, seats.
 
-Source: ours. Odometry's tilt drifts, and a floor that leans by a degree is 17 cm off after ten metres.
+Source: ours. The tilt of odometry drifts, and a floor that leans by one degree is 17 cm off after ten metres.
 """
 
 from __future__ import annotations
@@ -9,26 +9,28 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from placegraph.runtime.arrays import F64
-from placegraph.runtime.vision.point_to_plane import Surface
+from placegraph.runtime.vision.point_to_plane import SurfaceMap
+
+MIN_LEVEL_NORMALS = 100  # cells of the surface; chosen by hand
 
 
-class LevelConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+class LevelSurfaceConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """When a view shows which way is up."""
 
-    near_rad: float = 0.12  # a normal so near the expected up is that of a level surface
-    min_share: float = Field(default=0.1, gt=0)  # of the known cells must have one
+    max_angle_rad: float = 0.12  # between the normal of a level surface and the expected up
+    min_share: float = Field(default=0.1, gt=0)  # of the known normals must be those of level surfaces
     sigma_rad: float = Field(default=0.01, gt=0)  # of the mean of those normals
-    rounds: int = 3
+    iterations: int = 3
 
 
-def find_level(surface: Surface, world_from_camera: F64, config: LevelConfig) -> F64 | None:
-    """Up (3,), unit, in the camera's frame, near what the pose (4, 4) says; None where too little is level."""
+def up_from_level_surfaces(surface: SurfaceMap, world_from_camera: F64, config: LevelSurfaceConfig) -> F64 | None:
+    """Up (3,), unit, camera frame, near that of the pose (4, 4); None where too little of the surface is level."""
     normals = surface.normals.reshape(-1, 3)
     normals = normals[np.isfinite(normals[:, 0])]
     up = world_from_camera[2, :3]
-    for _ in range(config.rounds):
-        level = normals[normals @ up > np.cos(config.near_rad)]
-        if len(level) < config.min_share * max(len(normals), 1) or len(level) < 100:
+    for _ in range(config.iterations):
+        level = normals[normals @ up > np.cos(config.max_angle_rad)]
+        if len(level) < config.min_share * max(len(normals), 1) or len(level) < MIN_LEVEL_NORMALS:
             return None
         mean = np.median(level, axis=0)
         up = mean / np.linalg.norm(mean)

@@ -1,1 +1,1 @@
-"""Geometry and registration of views, shared by the nodes that estimate poses."""
+"""Geometry, registration and features of views: what the nodes that estimate poses share."""

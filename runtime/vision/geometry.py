@@ -41,12 +41,12 @@ def inverse(b_from_a: F64) -> F64:
 
 
 def nearest_rigid(matrix: F64) -> F64:
-    """The rigid (4, 4) transform nearest to a product of many: `inverse` transposes, so rounding would grow."""
+    """The rigid (4, 4) transform nearest to a product of many, which rounding has made slightly non-rigid."""
     u, _, vt = np.linalg.svd(matrix[:3, :3])
-    made = np.eye(4)
-    made[:3, :3] = u @ np.diag((1.0, 1.0, np.linalg.det(u @ vt))) @ vt
-    made[:3, 3] = matrix[:3, 3]
-    return made
+    rigid = np.eye(4)
+    rigid[:3, :3] = u @ np.diag((1.0, 1.0, np.linalg.det(u @ vt))) @ vt
+    rigid[:3, 3] = matrix[:3, 3]
+    return rigid
 
 
 def is_rigid(matrix: F64, tolerance: float = 1e-3) -> bool:
@@ -58,7 +58,7 @@ def is_rigid(matrix: F64, tolerance: float = 1e-3) -> bool:
 
 
 def rotation_between(a: F64, b: F64) -> F64:
-    """The smallest (3, 3) rotation that turns unit vector a onto unit vector b (any one of them when opposite)."""
+    """The smallest (3, 3) rotation that turns unit vector a onto unit vector b; any such when they are opposite."""
     cosine = float(a @ b)
     if cosine < -1 + 1e-9:
         axis = np.eye(3)[int(np.argmin(np.abs(a)))]

@@ -1,7 +1,8 @@
-"""The pose of a view from corners with known positions and a known surface: robust least squares.
+"""The pose of a view from matched points and a known surface: robust least squares.
 
-Source: Gauss-Newton on SE(3) with the residuals of RGB-D SLAM (pixel and inverse depth, as ORB-SLAM2's stereo points;
-point to plane, as KinectFusion). Departs: both at once, and a prediction that holds what neither does.
+Source: Gauss-Newton on SE(3) with the residuals of RGB-D SLAM (pixel and inverse depth, as the stereo points of
+ORB-SLAM2; point to plane, as KinectFusion). Not as there: both terms at once, and a prior on the predicted pose for
+the directions that neither term holds.
 """
 
 from __future__ import annotations
@@ -14,14 +15,13 @@ from pydantic import BaseModel
 
 from placegraph.runtime.arrays import F32, F64, Bool
 from placegraph.runtime.vision.geometry import inverse, nearest_rigid, transform
-from placegraph.runtime.vision.point_to_plane import Surface
+from placegraph.runtime.vision.point_to_plane import MIN_DEPTH_M, SurfaceMap
 
-NEAREST_M = 0.05  # before the camera; what is nearer or behind it has no pixel
-STILL = 1e-5  # metres, rad: a smaller step ends the iteration
+CONVERGED_STEP = 1e-5  # metres and rad: a smaller step ends the iteration
 
 
 class RegistrationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """How far to believe what."""
+    """Noise of the measurements, and when a match is an inlier."""
 
     pixel_sigma: float = 1.0
     inverse_depth_sigma: float = 0.004  # 1/m: OAK-D stereo .0026, Kinect about .003
@@ -30,8 +30,11 @@ class RegistrationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 
 
 @dataclass(frozen=True, eq=False)
-class Corners:
-    """Points (N, 3) in a reference frame, where an image shows them (N, 2) px, and how deep (N,) 1/m (0: unknown)."""
+class PointMatches:
+    """Points of a reference, found in an image.
+
+    xyz: (N, 3) metres, reference frame; uv: (N, 2) px in the image; inverse_depth: (N,) 1/m in the image, 0 = unknown.
+    """
 
     xyz: F64
     uv: F32
@@ -40,36 +43,43 @@ class Corners:
     def __len__(self) -> int:
         return len(self.uv)
 
-    def and_also(self, other: Corners) -> Corners:
-        """Both, these first."""
-        return Corners(
-            np.concatenate((self.xyz, other.xyz)),
-            np.concatenate((self.uv, other.uv)),
-            np.concatenate((self.inverse_depth, other.inverse_depth)),
+    def joined_with(self, others: PointMatches) -> PointMatches:
+        """These matches, followed by `others`."""
+        return PointMatches(
+            np.concatenate((self.xyz, others.xyz)),
+            np.concatenate((self.uv, others.uv)),
+            np.concatenate((self.inverse_depth, others.inverse_depth)),
         )
 
-    def linear(self, camera_from_reference: F64, intrinsics: F64, c: RegistrationConfig) -> tuple[F64, F64, F64]:
-        """Matrix (6, 6), slope (6,) of the least squares by the camera's motion; squared residuals (N,) in sigmas."""
+    def normal_equations(
+        self, camera_from_reference: F64, intrinsics: F64, c: RegistrationConfig
+    ) -> tuple[F64, F64, F64]:
+        """Least squares of the reprojection errors; parameters as in SurfaceMap.normal_equations.
+
+        Returns the matrix (6, 6), the gradient (6,) and the squared residuals (N,) in sigmas, infinite behind the
+        camera.
+        """
         fx, fy, cx, cy = intrinsics
         xyz = transform(camera_from_reference, self.xyz)
-        ahead, known = xyz[:, 2] > NEAREST_M, self.inverse_depth > 0
-        x, y, z = np.where(ahead[:, None], xyz, 1.0).T
-        a, b, d = fx / z / c.pixel_sigma, fy / z / c.pixel_sigma, known / z**2 / c.inverse_depth_sigma
+        is_ahead, has_depth = xyz[:, 2] > MIN_DEPTH_M, self.inverse_depth > 0
+        x, y, z = np.where(is_ahead[:, None], xyz, 1.0).T
+        du_dx, dv_dy = fx / z / c.pixel_sigma, fy / z / c.pixel_sigma
+        dd_dz = has_depth / z**2 / c.inverse_depth_sigma
         residual = np.stack(
             (
                 (fx * x / z + cx - self.uv[:, 0]) / c.pixel_sigma,
                 (fy * y / z + cy - self.uv[:, 1]) / c.pixel_sigma,
-                known * (1 / z - self.inverse_depth) / c.inverse_depth_sigma,
+                has_depth * (1 / z - self.inverse_depth) / c.inverse_depth_sigma,
             ),
             axis=1,
         )
-        squares = np.where(ahead, (residual**2).sum(axis=1), np.inf)
-        weight = np.where(ahead, 1 / (1 + squares / 4), 0.0)  # Cauchy
+        squares = np.where(is_ahead, (residual**2).sum(axis=1), np.inf)
+        weight = np.where(is_ahead, 1 / (1 + squares / 4), 0.0)  # Cauchy
         jacobian = np.zeros((len(xyz), 3, 6))
         zero = np.zeros(len(xyz))
-        jacobian[:, 0, :3] = np.stack((a, zero, -a * x / z), axis=1)
-        jacobian[:, 1, :3] = np.stack((zero, b, -b * y / z), axis=1)
-        jacobian[:, 2, 2] = -d
+        jacobian[:, 0, :3] = np.stack((du_dx, zero, -du_dx * x / z), axis=1)
+        jacobian[:, 1, :3] = np.stack((zero, dv_dy, -dv_dy * y / z), axis=1)
+        jacobian[:, 2, 2] = -dd_dz
         # the camera's points shift by t and turn by w: d xyz = t + w x xyz
         jacobian[:, :, 3:] = np.cross(np.stack((x, y, z), axis=1)[:, None], jacobian[:, :, :3])
         rows = jacobian.reshape(-1, 6)
@@ -78,55 +88,61 @@ class Corners:
 
 
 @dataclass(frozen=True, eq=False)
-class Laid:
-    """Points (M, 3) in metres, camera frame, to be laid onto a surface; (4, 4) where that was seen from."""
+class SurfaceMatch:
+    """Points (M, 3) in metres, camera frame, to fit to a surface that was seen from (4, 4) reference_from_surface."""
 
     points: F64
-    surface: Surface
+    surface: SurfaceMap
     reference_from_surface: F64
 
 
 @dataclass(frozen=True, eq=False)
-class Registered:
-    """A pose (4, 4), which corners agree with it (N,), and what share of the points met the surface."""
+class RegistrationResult:
+    """A pose (4, 4), which point matches agree with it (N,), and the share of points that lie on the surface."""
 
     reference_from_camera: F64
-    inlier: Bool
-    met: float
+    is_inlier: Bool
+    overlap: float
 
 
 def register(
-    corners: Corners, laid: Laid | None, intrinsics: F64, guess: F64, config: RegistrationConfig,
+    matches: PointMatches,
+    surface_match: SurfaceMatch | None,
+    intrinsics: F64,
+    guess: F64,
+    config: RegistrationConfig,
     prior_sigmas: tuple[float, float] | None = None,
-) -> Registered:  # fmt: skip
-    """The pose that explains corners and surface best, from `guess` (4, 4) reference_from_camera on.
+) -> RegistrationResult:
+    """The pose that explains matched points and surface best, iterated from `guess` (4, 4) reference_from_camera.
 
-    prior_sigmas: metres and rad by which the pose departs from the guess; None: the guess is only a start.
+    prior_sigmas: metres and rad by which the pose differs from the guess; None: the guess is only a start.
     """
     camera_from_reference = predicted = inverse(guess)
     prior = np.zeros((6, 6)) if prior_sigmas is None else np.diag(np.repeat(np.array(prior_sigmas) ** -2.0, 3))
-    met = 0.0
+    overlap = 0.0
     for _ in range(config.iterations):
-        matrix, slope, squares = corners.linear(camera_from_reference, intrinsics, config)
-        if laid is not None:
-            surface_from_camera = inverse(laid.reference_from_surface) @ inverse(camera_from_reference)
-            of_planes, slope_of_planes, met = laid.surface.linear(surface_from_camera, laid.points)
-            matrix, slope = matrix + of_planes, slope + slope_of_planes
-        off = logarithm(camera_from_reference @ inverse(predicted))
-        step = np.asarray(-np.linalg.solve(matrix + prior + 1e-9 * np.eye(6), slope + prior @ off))
+        matrix, gradient, squares = matches.normal_equations(camera_from_reference, intrinsics, config)
+        if surface_match is not None:
+            surface_from_camera = inverse(surface_match.reference_from_surface) @ inverse(camera_from_reference)
+            surface_matrix, surface_gradient, overlap = surface_match.surface.normal_equations(
+                surface_from_camera, surface_match.points
+            )
+            matrix, gradient = matrix + surface_matrix, gradient + surface_gradient
+        deviation = logarithm(camera_from_reference @ inverse(predicted))
+        step = np.asarray(-np.linalg.solve(matrix + prior + 1e-9 * np.eye(6), gradient + prior @ deviation))
         camera_from_reference = exponential(step) @ camera_from_reference
-        if np.abs(step).max() < STILL:
+        if np.abs(step).max() < CONVERGED_STEP:
             break
     pose = nearest_rigid(inverse(camera_from_reference))
-    return Registered(pose, squares < config.inlier_sigmas**2, met)
+    return RegistrationResult(pose, squares < config.inlier_sigmas**2, overlap)
 
 
 def project(xyz: F64, intrinsics: F64, reference_from_camera: F64) -> F64:
-    """Pixels (N, 2) of points (N, 3) of the reference frame; NaN for what is not before the camera."""
-    seen = transform(inverse(reference_from_camera), xyz)
+    """Pixels (N, 2) of points (N, 3) of the reference frame; NaN for points that are not in front of the camera."""
+    xyz_camera = transform(inverse(reference_from_camera), xyz)
     fx, fy, cx, cy = intrinsics
-    z = np.where(seen[:, 2] > NEAREST_M, seen[:, 2], np.nan)
-    return np.stack((fx * seen[:, 0] / z + cx, fy * seen[:, 1] / z + cy), axis=1)
+    z = np.where(xyz_camera[:, 2] > MIN_DEPTH_M, xyz_camera[:, 2], np.nan)
+    return np.stack((fx * xyz_camera[:, 0] / z + cx, fy * xyz_camera[:, 1] / z + cy), axis=1)
 
 
 def rays(uv: F32, intrinsics: F64) -> F64:
@@ -136,7 +152,7 @@ def rays(uv: F32, intrinsics: F64) -> F64:
 
 
 def inverse_depth_at(depth_m: F32, uv: F32) -> F64:
-    """(N,) 1/m at pixels (N, 2), 0 where there is no reading or those around it differ: a depth edge."""
+    """(N,) 1/m at pixels (N, 2); 0 without a reading and at depth edges, where the readings around a pixel differ."""
     height, width = depth_m.shape
     column = np.clip(np.rint(uv[:, 0]).astype(int), 1, width - 2)
     row = np.clip(np.rint(uv[:, 1]).astype(int), 1, height - 2)
@@ -144,16 +160,16 @@ def inverse_depth_at(depth_m: F32, uv: F32) -> F64:
     patch = depth_m[row[:, None] + offsets[:, 0], column[:, None] + offsets[:, 1]].astype(float)
     valid = patch > 0
     low, high = np.where(valid, patch, np.inf).min(axis=1), patch.max(axis=1)
-    good = (valid.sum(axis=1) >= 6) & valid[:, 4] & (high - low < 0.05 * low)
-    return np.where(good, 1 / np.where(good, patch[:, 4], 1.0), 0.0)
+    is_flat = (valid.sum(axis=1) >= 6) & valid[:, 4] & (high - low < 0.05 * low)
+    return np.where(is_flat, 1 / np.where(is_flat, patch[:, 4], 1.0), 0.0)
 
 
 def exponential(step: F64) -> F64:
-    """A motion (6,), shift in metres and turn in rad, as (4, 4); shift and turn are not coupled."""
-    made = np.eye(4)
-    made[:3, :3] = cv2.Rodrigues(step[3:])[0]
-    made[:3, 3] = step[:3]
-    return made
+    """A motion (6,), shift in metres and turn in rad, as (4, 4); shift and turn are independent (R3 x SO3)."""
+    motion = np.eye(4)
+    motion[:3, :3] = cv2.Rodrigues(step[3:])[0]
+    motion[:3, 3] = step[:3]
+    return motion
 
 
 def logarithm(motion: F64) -> F64:

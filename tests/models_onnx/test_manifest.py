@@ -5,7 +5,14 @@ from pathlib import Path
 import pytest
 
 from placegraph.models_onnx import manifest
-from placegraph.models_onnx.manifest import ModelOptions, Weights, entries, find, folders, read_lines
+from placegraph.models_onnx.manifest import (
+    ModelOptions,
+    Weights,
+    find_weights,
+    known_weights,
+    model_folders,
+    read_lines,
+)
 from placegraph.runtime.errors import ModelError
 
 
@@ -26,27 +33,27 @@ def write(folder, name="mine", content=b"model", labels="", **changes):
 
 def test_our_manifest_reads_and_names_known_families():
     families = {path.stem for path in manifest.PACKAGE_DIR.glob("*.py")}
-    ours = entries()
+    ours = known_weights()
     assert {"yolox_nano", "yolov8n_seg_320", "mobilenet_v2"} <= set(ours)
     assert {listed.entry.family for listed in ours.values()} <= families
 
 
 def test_find_gives_verified_files(tmp_path):
     folder = write(tmp_path / "a", labels="labels = ['cup', 'lamp']\noptions = { min_score = 0.5 }")
-    found = find("mine", [folder])
+    found = find_weights("mine", [folder])
     assert found == Weights("mine", "yolo", {"model": folder / "mine.bin"}, ("cup", "lamp"), {"min_score": 0.5})
 
 
 def test_an_unknown_name_lists_the_known_ones(tmp_path):
     with pytest.raises(ModelError, match=r"no weights named 'yolo9'; there are: .*mine.*yolox_nano"):
-        find("yolo9", [write(tmp_path / "a")])
+        find_weights("yolo9", [write(tmp_path / "a")])
 
 
 def test_a_missing_file_lists_every_folder_and_the_command(tmp_path):
     folder = write(tmp_path / "a")
     (folder / "mine.bin").unlink()
     with pytest.raises(ModelError) as caught:
-        find("mine", [folder, tmp_path / "b"])
+        find_weights("mine", [folder, tmp_path / "b"])
     text = str(caught.value)
     places = [folder, tmp_path / "b", manifest.EMBEDDED_DIR, manifest.WEIGHTS_DIR]
     assert all(str(place) in text for place in places)
@@ -57,7 +64,7 @@ def test_a_damaged_file_is_named_with_both_checksums(tmp_path):
     folder = write(tmp_path / "a")
     (folder / "mine.bin").write_bytes(b"changed")
     with pytest.raises(ModelError) as caught:
-        find("mine", [folder])
+        find_weights("mine", [folder])
     for content in (b"model", b"changed"):
         assert hashlib.sha256(content).hexdigest() in str(caught.value)
 
@@ -67,19 +74,19 @@ def test_a_file_of_the_same_name_elsewhere_is_passed_over(tmp_path):
     other.mkdir()
     (folder / "mine.bin").rename(other / "mine.bin")
     (folder / "mine.bin").write_bytes(b"of another network")
-    assert find("mine", [folder, other]).files["model"] == other / "mine.bin"
+    assert find_weights("mine", [folder, other]).files["model"] == other / "mine.bin"
 
 
 def test_the_environment_names_folders(tmp_path, monkeypatch):
     one, two = write(tmp_path / "a"), write(tmp_path / "b", name="other")
     monkeypatch.setenv(manifest.MODELS_VARIABLE, f"{one}:{two}")
-    assert folders([two])[2:] == [one, two]
-    assert find("other").files["model"] == two / "other.bin"
+    assert model_folders([two])[2:] == [one, two]
+    assert find_weights("other").files["model"] == two / "other.bin"
 
 
 def test_one_name_in_two_manifests_is_refused(tmp_path):
     with pytest.raises(ModelError, match=r"'mine' are described twice: .*a/manifest\.toml and .*b/manifest\.toml"):
-        entries([write(tmp_path / "a"), write(tmp_path / "b")])
+        known_weights([write(tmp_path / "a"), write(tmp_path / "b")])
 
 
 @pytest.mark.parametrize(
@@ -93,14 +100,14 @@ def test_one_name_in_two_manifests_is_refused(tmp_path):
 )
 def test_a_wrong_row_is_named(tmp_path, changes, text):
     with pytest.raises(ModelError, match=text):
-        entries([write(tmp_path / "a", **changes)])
+        known_weights([write(tmp_path / "a", **changes)])
 
 
 @pytest.mark.parametrize("content", ["[weights", "x = 1", "weights = 3", "[weights]\na = 3"])
 def test_a_broken_manifest_is_named(tmp_path, content):
     (tmp_path / "manifest.toml").write_text(content)
     with pytest.raises(ModelError, match=r"manifest\.toml: "):
-        entries([tmp_path])
+        known_weights([tmp_path])
 
 
 def test_labels_come_from_a_file(tmp_path):
@@ -108,10 +115,10 @@ def test_labels_come_from_a_file(tmp_path):
     folder = write(tmp_path / "a", content=names)
     text = (folder / "manifest.toml").read_text()
     (folder / "manifest.toml").write_text(text.replace("model =", "labels ="))
-    assert find("mine", [folder]).labels == ("cup", "lamp")
+    assert find_weights("mine", [folder]).labels == ("cup", "lamp")
     (folder / "manifest.toml").write_text(text.replace("model =", "labels =").replace("files", "labels = ['a']\nfiles"))
     with pytest.raises(ModelError, match="given both"):
-        find("mine", [folder])
+        find_weights("mine", [folder])
 
 
 def test_read_lines_refuses_nothing_and_nonsense(tmp_path):
@@ -138,7 +145,7 @@ def test_missing_roles_labels_and_wrong_options_are_named():
 @pytest.mark.weights
 def test_the_real_weights_are_those_of_the_manifest(real_models):
     for name in ("yolox_nano", "yolov8n_seg_320", "mobilenet_v2"):
-        found = find(name, [real_models])
+        found = find_weights(name, [real_models])
         table = tomllib.loads((manifest.PACKAGE_DIR / "manifest.toml").read_text())["weights"][name]
         assert {role: path.stat().st_size for role, path in found.files.items()} == {
             role: row["size_bytes"] for role, row in table["files"].items()

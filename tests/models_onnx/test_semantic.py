@@ -8,7 +8,7 @@ from onnx import TensorProto, helper, numpy_helper
 from placegraph.models_onnx import Detector, InstanceSegmenter, Segmenter, Tagger
 from placegraph.models_onnx.load import load
 from placegraph.models_onnx.semantic import FAMILY
-from placegraph.nodes.camera._flat import CLASSES
+from placegraph.nodes.camera._flat_scene import CLASSES
 from placegraph.nodes.camera.flat import SOURCE
 from placegraph.runtime.errors import ModelError
 

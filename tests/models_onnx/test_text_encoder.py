@@ -44,8 +44,8 @@ def test_a_caller_cannot_change_the_cache():
 
 def test_the_texts_used_last_are_kept_and_no_more(monkeypatch):
     encoded = []
-    one = text._encode_one
-    monkeypatch.setattr(text, "_encode_one", lambda words: encoded.append(words) or one(words))
+    one = text._encode_text
+    monkeypatch.setattr(text, "_encode_text", lambda words: encoded.append(words) or one(words))
     encoder = TextEncoder(max_texts=2)
     first = encoder.encode(["cup", "sofa", "cup", "vase", "cup"])  # vase takes the place of sofa
     assert encoded == ["cup", "sofa", "vase"]

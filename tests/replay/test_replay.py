@@ -20,7 +20,7 @@ CHANGED: dict[str, dict[str, Any]] = {
     "tagger": {"max_objects": 1},
     "detector": {"max_objects": 1},
     "segmenter": {"max_objects": 1},
-    "pose_graph": {"loop_m": 0.1, "loop_rad": 0.1},
+    "pose_graph": {"loop_sigma_m": 0.1, "loop_sigma_rad": 0.1},
     "fusion": {"edge_ratio": 0.06},
     "hierarchy": {"floors": {"bin_m": 0.02}},
     "grounding": {"use_model": False},

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from placegraph.models_onnx.manifest import MODELS_VARIABLE, FileEntry, entries, find
+from placegraph.models_onnx.manifest import MODELS_VARIABLE, FileEntry, find_weights, known_weights
 from placegraph.runtime.errors import ModelError
 from placegraph.tools.models import app, fetch_file, import_files
 
@@ -98,21 +98,21 @@ def test_import_copies_known_files_only(folder, tmp_path):
     names = ["boxes.onnx", "decoder.onnx", "encoder.onnx", "instances.onnx", "tags.onnx"]
     assert sorted(path.name for path in target.iterdir()) == names
     (target / "manifest.toml").write_bytes((folder / "manifest.toml").read_bytes())
-    assert find("tiny_sam", [target]).files["decoder"] == target / "decoder.onnx"
+    assert find_weights("tiny_sam", [target]).files["decoder"] == target / "decoder.onnx"
 
 
 def test_import_of_a_damaged_file_copies_nothing(folder, tmp_path):
     (folder / "tags.onnx").write_bytes(b"changed")
     with pytest.raises(ModelError, match=r"tags\.onnx: sha256 is "):
-        import_files(folder, tmp_path / "weights", entries([folder]))
+        import_files(folder, tmp_path / "weights", known_weights([folder]))
     assert not (tmp_path / "weights").exists()
 
 
 def test_import_of_nothing_is_an_error(tmp_path):
     with pytest.raises(ModelError, match="no such folder"):
-        import_files(tmp_path / "no", tmp_path, entries())
+        import_files(tmp_path / "no", tmp_path, known_weights())
     with pytest.raises(ModelError, match=r"holds none of the known files: .*yolox_nano\.onnx"):
-        import_files(tmp_path, tmp_path, entries())
+        import_files(tmp_path, tmp_path, known_weights())
 
 
 def test_fetch(server, tmp_path):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.camera import detect
+from placegraph.nodes.camera import detect_source
 from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_by_examples, read_request
 from placegraph.nodes.grounding.name_matching import Names
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
@@ -69,7 +69,7 @@ def map_scene(folder: Path, source: Path) -> Scene:
     asked = read_questions(source)
     if not asked:
         raise SourceError(f"{source}: no questions in truth/questions.json")
-    given = detect(str(source))(source, {}).given_poses()
+    given = detect_source(str(source))(source, {}).given_poses()
     estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
     true_from_map = level_alignment(estimated, true)
     boxes = {one.id: one.box for one in read_aligned(folder, true_from_map).objects}

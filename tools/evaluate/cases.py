@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.nodes.camera import detect
+from placegraph.nodes.camera import detect_source
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.evaluate.aligned_map import read_aligned
@@ -28,7 +28,7 @@ def source_scores(folder: Path, source: Path, questions: bool = False) -> dict[s
     Raises SourceError when the data set gives fewer than three poses at the times of the map's, or is damaged;
     SchemaError for a damaged map.
     """
-    given = detect(str(source))(source, {}).given_poses()
+    given = detect_source(str(source))(source, {}).given_poses()
     found = trajectory_scores(read_poses(folder / TRAJECTORY), given)
     if found is None:
         raise SourceError(f"{source}: fewer than 3 given poses at the times of {folder / TRAJECTORY}")
@@ -73,7 +73,7 @@ def has_truth(source: Path) -> bool:
 def _house_poses(source: Path, option: str) -> Mapping[int, F64]:
     if not has_truth(source):
         raise ConfigError(f"{source}: no {TRUTH}/ here; {option} needs a house with its truth")
-    given = detect(str(source))(source, {}).given_poses()
+    given = detect_source(str(source))(source, {}).given_poses()
     if not given:
         raise SourceError(f"{source}: no poses are given")
     return given

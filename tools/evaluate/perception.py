@@ -13,7 +13,7 @@ import numpy as np
 
 from placegraph.models_onnx import Boxes, Detector, ScoredNames, Segmenter, Tagger
 from placegraph.models_onnx.load import load
-from placegraph.models_onnx.manifest import find
+from placegraph.models_onnx.manifest import find_weights
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.language.word_forms import normal_form
@@ -69,14 +69,14 @@ class Networks:
         if not isinstance(tagger, Tagger):
             raise ConfigError(f"--tagger: {names[0]!r} cannot tag images")
         if not isinstance(detector, Detector):
-            raise ConfigError(f"--detector: {names[1]!r} cannot find boxes")
+            raise ConfigError(f"--detector: {names[1]!r} cannot find_weights boxes")
         if not isinstance(segmenter, Segmenter):
             raise ConfigError(f"--segmenter: {names[2]!r} cannot give masks for boxes")
         return cls(tagger, detector, segmenter)
 
 
 def _unfloored(name: str, model_dirs: Sequence[Path]) -> object:
-    weights = find(name, model_dirs)
+    weights = find_weights(name, model_dirs)
     options = import_module(f"{FAMILIES}.{weights.family}").Options
     floor = {"min_score": MIN_SCORE} if "min_score" in options.model_fields else {}
     with tempfile.TemporaryDirectory() as folder:

@@ -56,14 +56,16 @@ def refine(
     ] = False,
 ) -> None:
     """Train the objects further on larger images; with --from-package also on views of your own."""
-    from placegraph.models_onnx.manifest import find
+    from placegraph.models_onnx.manifest import find_weights
     from placegraph.tools.training.fold import folded, packaged_start
     from placegraph.tools.training.loop import read_average
     from placegraph.tools.training.networks import ObjectNetwork
     from placegraph.tools.training.objects import refine_objects
 
     if from_package:
-        start = packaged_start(find("house_detector").files["model"], find("house_tagger").files["model"])
+        start = packaged_start(
+            find_weights("house_detector").files["model"], find_weights("house_tagger").files["model"]
+        )
     else:
         start = folded(read_average(work / "objects.pt", ObjectNetwork()))
     refine_objects(start, data, work / "refined.pt", steps, threads=threads)
@@ -140,7 +142,7 @@ def evaluate_locations(
     for name in model or ["house_locations"]:
         network = load(name, models or [])
         if not isinstance(network, LocationDetector):
-            raise wrong_task("hierarchy", name, network, "find locations")
+            raise wrong_task("hierarchy", name, network, "find_weights locations")
         finders[name] = with_config(LocationConfig(model=name), network)
     print(comparison(finders, EVALUATION_SEEDS[:houses]))
 

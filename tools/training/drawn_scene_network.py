@@ -17,7 +17,7 @@ import numpy as np
 from placegraph import models_onnx
 from placegraph.models_onnx.manifest import Weights
 from placegraph.models_onnx.semantic import FAMILY
-from placegraph.nodes.camera._flat import CLASSES
+from placegraph.nodes.camera._flat_scene import CLASSES
 from placegraph.nodes.camera.flat import SOURCE
 from placegraph.runtime.arrays import F32, U8
 

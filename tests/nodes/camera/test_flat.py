@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from placegraph.nodes.camera import _flat as scene
-from placegraph.nodes.camera.flat import SOURCE, Boxes, Flat, cast_rays, rooms, truth
+from placegraph.nodes.camera import _flat_scene as scene
+from placegraph.nodes.camera.flat import SOURCE, Flat, SceneBoxes, cast_rays, rooms, truth
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.vision import geometry
 
@@ -19,8 +19,8 @@ def drawn(**settings: Any) -> Flat:
     return SOURCE(Path(), {**SMALL, **settings})
 
 
-def one_box(low: tuple[float, ...], high: tuple[float, ...]) -> Boxes:
-    return Boxes(
+def one_box(low: tuple[float, ...], high: tuple[float, ...]) -> SceneBoxes:
+    return SceneBoxes(
         np.array([low], np.float32),
         np.array([high], np.float32),
         np.zeros((1, 3), np.float32),
@@ -83,7 +83,9 @@ def test_a_box_that_reaches_behind_the_camera_is_cut_not_lost():
 def test_nearest_box_wins_whatever_the_order():
     near, far = one_box((-1, -1, 2), (1, 1, 3)), one_box((-1, -1, 4), (1, 1, 5))
     for first, second, nearest in ((near, far, 0), (far, near, 1)):
-        both = Boxes(*(np.concatenate((getattr(first, k), getattr(second, k))) for k in Boxes.__dataclass_fields__))
+        both = SceneBoxes(
+            *(np.concatenate((getattr(first, k), getattr(second, k))) for k in SceneBoxes.__dataclass_fields__)
+        )
         depth, box, _ = cast_rays(rays_of(CAMERA, 21, 21), CAMERA, np.eye(4), both)
         assert depth[10, 10] == pytest.approx(2.0)
         assert box[10, 10] == nearest

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from placegraph.nodes.camera import NODE, Camera, CameraConfig, detect, find
+from placegraph.nodes.camera import NODE, Camera, CameraConfig, detect_source, find_source
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import End, Frame
 from placegraph.runtime.node import Context
@@ -46,7 +46,7 @@ def test_auto_finds_each_format_without_importing_a_device(
     name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.delitem(sys.modules, "placegraph.nodes.camera.oak", raising=False)
-    assert detect(str(request.getfixturevalue(name))) is find({"seven": "sevenscenes"}.get(name, name))
+    assert detect_source(str(request.getfixturevalue(name))) is find_source({"seven": "sevenscenes"}.get(name, name))
     assert "placegraph.nodes.camera.oak" not in sys.modules
 
 
@@ -59,7 +59,7 @@ def test_auto_on_a_folder_of_two_formats_asks_which(seven: Path):
 
 def test_unknown_source_lists_the_choices():
     with pytest.raises(ConfigError, match=r"no camera source named 'webcam'.*flat"):
-        find("webcam")
+        find_source("webcam")
 
 
 @pytest.mark.parametrize("settings", [{"limit": -1}, {"paht": "x"}, {"limit": "3"}])
@@ -172,7 +172,7 @@ def test_one_walk_in_each_format_is_the_same_world(write, tmp_path: Path):
     for frame in walk:
         assert frame.depth_unit_m == 0.001
         settings = write(folder, frame.frame_id, frame)
-    found = list(detect(str(folder))(folder, settings).frames())
+    found = list(detect_source(str(folder))(folder, settings).frames())
     assert len(found) == len(walk)
     for there, here in zip(found, walk, strict=True):
         there.check()

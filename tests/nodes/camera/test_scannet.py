@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from placegraph.nodes.camera.scannet import SOURCE, redraw
+from placegraph.nodes.camera.scannet import SOURCE, reproject_color
 from placegraph.runtime.errors import ConfigError, SourceError
 
 
@@ -58,7 +58,7 @@ def test_color_is_drawn_into_the_pinhole_of_depth():
         return np.stack((x, y, -x), axis=2) * 150 + 128  # 2.3 steps a pixel of depth
 
     color_k, depth_k = np.array([120.0, 118.0, 66.0, 47.0]), np.array([66.0, 65.0, 32.0, 23.5])
-    drawn = redraw(np.round(angles(color_k, 96, 128)).astype(np.uint8), color_k, depth_k, (48, 64))
+    drawn = reproject_color(np.round(angles(color_k, 96, 128)).astype(np.uint8), color_k, depth_k, (48, 64))
     error = drawn - angles(depth_k, 48, 64)
     assert np.abs(error).max() < 1.5  # rounded three times
     x, _, mirrored = error.mean(axis=(0, 1))  # halves are rounded up in both, a shift would part them
@@ -68,13 +68,13 @@ def test_color_is_drawn_into_the_pinhole_of_depth():
 def test_color_of_depths_size_and_pinhole_is_left_as_it_is():
     noise = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
     pinhole = np.array([57.0, 58.0, 31.2, 24.5])
-    assert np.array_equal(redraw(noise, pinhole, pinhole, (48, 64)), noise)
+    assert np.array_equal(reproject_color(noise, pinhole, pinhole, (48, 64)), noise)
 
 
 def test_colors_edge_is_repeated_where_depth_sees_more():
     plain = np.full((48, 64, 3), 90, np.uint8)
     wider = np.array([50.0, 50.0, 32.0, 24.0])
-    assert (redraw(plain, np.array([57.0, 57.0, 32.0, 24.0]), wider, (48, 64)) == 90).all()
+    assert (reproject_color(plain, np.array([57.0, 57.0, 32.0, 24.0]), wider, (48, 64)) == 90).all()
 
 
 @pytest.mark.parametrize("kind", ["color", "depth"])

@@ -147,7 +147,7 @@ def test_real_frames():
 @pytest.mark.parametrize("kind", [".png", ".jpg"])
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.99])
 def test_an_image_cut_anywhere_is_refused_in_silence(tmp_path, capfd, kind: str, share: float) -> None:
-    from placegraph.nodes.camera._folder import read_color
+    from placegraph.nodes.camera._dataset_reader import read_color
     from placegraph.runtime.errors import SourceError
 
     noise = np.random.default_rng(0).integers(0, 255, (60, 80, 3), np.uint8)

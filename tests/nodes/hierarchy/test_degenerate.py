@@ -7,7 +7,7 @@ import pytest
 
 from placegraph.nodes.fusion import NODE as FUSION
 from placegraph.nodes.hierarchy import NODE as HIERARCHY
-from placegraph.nodes.pose.gravity import find_up
+from placegraph.nodes.pose.gravity import estimate_up
 from placegraph.runtime.messages import Keyframe, LastKeyframe, Segments
 from placegraph.runtime.node import Context
 from placegraph.runtime.scene_graph import SceneGraph
@@ -151,7 +151,7 @@ def test_which_way_is_up_for_an_upside_down_camera(known):
     camera = pose((1.5, 2, 1.4), 0.0, 0.35, UPSIDE_DOWN)
     cloud = backproject(depth_of(GROUND + WALLS, camera) * np.float32(0.001), INTRINSICS, 1)
     up = camera[:3, :3].T @ (0.0, 0, 1)
-    found = find_up([(np.eye(4), up if known else np.full(3, np.nan), cloud)], 0)
+    found = estimate_up([(np.eye(4), up if known else np.full(3, np.nan), cloud)], 0)
     # a level plane says which axis is vertical and never which end of it is up: that takes the source or the IMU
     assert abs(float(found.up @ up)) == pytest.approx(1, abs=0.02) and (found.up @ up > 0) == known
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from placegraph.nodes.pose.kiss_icp import Odometry, OdometryConfig
+from placegraph.nodes.pose.kiss_icp import KissIcpConfig, KissIcpOdometry
 
 
 def corner(count: int, seed: int) -> np.ndarray:
@@ -12,11 +12,11 @@ def corner(count: int, seed: int) -> np.ndarray:
 
 
 def test_after_a_lost_track_a_place_that_fits_halfway_is_not_trusted() -> None:
-    config = OdometryConfig(min_quality=0.25, relock_quality=0.7)
+    config = KissIcpConfig(min_quality=0.25, relock_quality=0.7)
     half = np.concatenate((corner(300, 9), np.random.default_rng(1).uniform(2.2, 3.2, (900, 3)))).astype(np.float32)
 
-    followed = Odometry(config, 1)
-    lost = Odometry(config, 1)
+    followed = KissIcpOdometry(config, 1)
+    lost = KissIcpOdometry(config, 1)
     for odometry in (followed, lost):
         for i in range(12):
             assert odometry.register(corner(400, i), i)["trusted"]

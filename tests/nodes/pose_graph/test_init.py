@@ -102,4 +102,4 @@ def test_a_camera_that_stands_still_is_remembered_once(keyframe, standing) -> No
     node = PoseGraphNode(PoseGraphConfig(), Context())
     for i in range(5):
         node.step(keyframe(i, standing(0, 0, 0), standing(0, 0, 0)))
-    assert [one is not None for one in node._places.features] == [True, False, False, False, False]
+    assert [one is not None for one in node._loop_detector.features] == [True, False, False, False, False]

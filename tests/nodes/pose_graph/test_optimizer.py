@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.pose_graph.optimizer import Edge, Level, optimise
+from placegraph.nodes.pose_graph.optimizer import Edge, UpMeasurement, optimise
 from placegraph.runtime.vision.geometry import inverse
 from placegraph.runtime.vision.registration import exponential
 
@@ -55,7 +55,7 @@ def test_one_wrong_loop_among_right_ones_is_outvoted() -> None:
 @pytest.mark.parametrize("count", [2, 25])
 def test_levels_take_the_tilt_away(count: int) -> None:
     true, poses, edges = ring(count, np.array([0, 0, 0, 0.01, -0.01, 0.0]))
-    levels = [Level(i, true[i][2, :3], 0.01) for i in range(count)]
+    levels = [UpMeasurement(i, true[i][2, :3], 0.01) for i in range(count)]
     found = optimise(poses, edges, levels, iterations=20)
     assert np.abs(found[:, 2, :3] - true[:, 2, :3]).max() < max(
         0.3 * np.abs(poses[:, 2, :3] - true[:, 2, :3]).max(), 0.006

@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from placegraph.models_onnx.manifest import Weights, find
+from placegraph.models_onnx.manifest import Weights, find_weights
 from placegraph.models_onnx.semantic import FAMILY
-from placegraph.nodes.camera._flat import CLASSES
+from placegraph.nodes.camera._flat_scene import CLASSES
 from placegraph.tools.training import drawn_scene_network as tool
 
 
@@ -55,4 +55,4 @@ def test_the_file_computes_what_was_fitted(layers, tmp_path: Path):
 
 
 def test_the_manifest_lists_the_classes_of_the_scene():
-    assert find("drawn_scene").labels == CLASSES
+    assert find_weights("drawn_scene").labels == CLASSES

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
-from placegraph.models_onnx.manifest import find  # noqa: E402
+from placegraph.models_onnx.manifest import find_weights  # noqa: E402
 from placegraph.models_onnx.session import Session  # noqa: E402
 from placegraph.models_onnx.text_encoder import TextEncoder  # noqa: E402
 from placegraph.runtime.errors import ModelError  # noqa: E402
@@ -19,7 +19,7 @@ torch.set_num_threads(1)
 
 
 def packaged():
-    return find("house_detector").files["model"], find("house_tagger").files["model"]
+    return find_weights("house_detector").files["model"], find_weights("house_tagger").files["model"]
 
 
 def test_a_folded_network_is_the_same_function():

@@ -1,4 +1,4 @@
-"""The drawn flat: a kitchen and a living room joined by a doorway, made of coloured boxes, and a walk through both.
+"""Scene of the drawn flat: a kitchen, a living room and a doorway, made of coloured boxes, and a walk through both.
 
 Metres; world frame with z up, the kitchen's south-west corner at the origin. All of it is made up.
 """
@@ -31,7 +31,7 @@ STRUCTURE: tuple[tuple[Color, Span], ...] = (
     ((226, 221, 208), (4.0, 0.0, 0.0, 4.15, 1.4, CEILING_M)),  # between the rooms, beside the doorway
     ((226, 221, 208), (4.0, 2.4, 0.0, 4.15, 4.0, CEILING_M)),
     ((226, 221, 208), (4.0, 1.4, 2.05, 4.15, 2.4, CEILING_M)),  # above the doorway
-    # posts, beams and radiators: bare planes would leave odometry by shape nothing to hold on to
+    # posts, beams and radiators: odometry by shape needs more than bare planes
     *(((216, 210, 196), (x, 0.0, 0.0, x + 0.25, 0.18, CEILING_M)) for x in (0.0, 1.3, 2.7, 3.75, 4.15, 5.2, 8.1, 8.9)),
     *(((216, 210, 196), (x, 3.82, 0.0, x + 0.25, 4.0, CEILING_M)) for x in (0.7, 3.3, 4.15, 5.3, 7.9, 8.9)),
     *(((216, 210, 196), (0.0, y, 0.0, 0.18, y + 0.25, CEILING_M)) for y in (0.7, 1.9, 2.8)),
@@ -165,7 +165,7 @@ STEP_M, STEP_RAD = 0.05, np.deg2rad(3.0)  # the longest step and turn between tw
 
 
 @cache
-def whole_walk() -> tuple[F64, int]:
+def sample_walk() -> tuple[F64, int]:
     """The walk sampled densely: rows (K, 4) of x, y, heading in rad and the share of the walk done, and its frames."""
     knots = np.array(WALK)
     along = np.linspace(0.0, len(knots) - 1.0, 4001)
@@ -177,9 +177,9 @@ def whole_walk() -> tuple[F64, int]:
     return np.column_stack((path, done / done[-1])), int(np.ceil(done[-1])) + 1
 
 
-def poses(frames: int) -> F64:
+def camera_poses(frames: int) -> F64:
     """`frames` camera poses evenly along the walk: world_from_camera (frames, 4, 4) in metres."""
-    path, _ = whole_walk()
+    path, _ = sample_walk()
     shares = np.linspace(0.0, 1.0, frames)
     x, y, heading = (np.interp(shares, path[:, 3], path[:, k]) for k in range(3))
     cosine, sine = np.cos(heading), np.sin(heading)

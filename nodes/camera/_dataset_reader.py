@@ -1,4 +1,4 @@
-"""What every data set folder needs: settings, images and calibration read strictly, with errors that name the file."""
+"""Read the parts of a data set folder: settings, images, poses and calibration, with errors that name the file."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def read_text(path: Path) -> str:
 
 
 def read_numbers(path: Path, shape: tuple[int, ...], what: str) -> F64:
-    """A text file of just so many numbers, which may be nan or inf; raises SourceError."""
+    """Numbers of a text file as an array of `shape`, which may hold nan or inf; raises SourceError."""
     text = read_text(path)
     try:
         values = np.array([float(word) for word in text.split()])
@@ -73,15 +73,15 @@ def read_pinhole(path: Path, size: int = 3) -> F64:
     """Read fx fy cx cy (4,) in px out of a file with a camera matrix of (size, size); raises SourceError."""
     matrix = read_numbers(path, (size, size), "a camera matrix")
     focal_and_centre = matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
-    plain = np.eye(size)
-    plain[[0, 1, 0, 1], [0, 1, 2, 2]] = focal_and_centre
-    if not np.allclose(matrix, plain, equal_nan=True):
+    pinhole = np.eye(size)
+    pinhole[[0, 1, 0, 1], [0, 1, 2, 2]] = focal_and_centre
+    if not np.allclose(matrix, pinhole, equal_nan=True):
         raise SourceError(f"{path}: not a pinhole camera matrix without skew: {matrix.tolist()}")
     return check_intrinsics(focal_and_centre, str(path))
 
 
-def numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, Path]:
-    """The files whose whole name fits `pattern`, by the frame number that its first group holds, in ascending order.
+def numbered_files(folder: Path, pattern: re.Pattern[str]) -> dict[int, Path]:
+    """The files whose whole name fits `pattern` by frame number, the first group of `pattern`, in ascending order.
 
     Raises SourceError without such a folder and where two files have one number.
     """
@@ -89,33 +89,33 @@ def numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, Path]:
         names = sorted(path.name for path in folder.iterdir())
     except OSError as error:
         raise SourceError(f"{folder}: cannot be read: {_reason(error)}") from None
-    found: dict[int, Path] = {}
+    files: dict[int, Path] = {}
     for match in filter(None, map(pattern.fullmatch, names)):
         number, path = int(match[1]), folder / match[0]
-        if number in found:
-            raise SourceError(f"{path}: frame {number} has a second file, {found[number].name}")
-        found[number] = path
-    return dict(sorted(found.items()))
+        if number in files:
+            raise SourceError(f"{path}: frame {number} has a second file, {files[number].name}")
+        files[number] = path
+    return dict(sorted(files.items()))
 
 
 def check_same_frames(kinds: dict[str, dict[int, Path]]) -> None:
     """Raise SourceError where not every kind of file ("colour", "depth", ...) has the frames of the first."""
     (name, files), *others = kinds.items()
     for other_name, other in others:
-        lone = sorted(files.keys() ^ other.keys())
-        if lone:
-            path, lacks = (files[lone[0]], other_name) if lone[0] in files else (other[lone[0]], name)
+        unpaired = sorted(files.keys() ^ other.keys())
+        if unpaired:
+            path, missing = (files[unpaired[0]], other_name) if unpaired[0] in files else (other[unpaired[0]], name)
             counts = f"{len(files)} {name} and {len(other)} {other_name} files"
-            raise SourceError(f"{path}: frame {lone[0]} has no {lacks} file ({counts})")
+            raise SourceError(f"{path}: frame {unpaired[0]} has no {missing} file ({counts})")
 
 
 def read_color(path: Path) -> U8:
-    """(H, W, 3) uint8 sRGB; raises SourceError for what is no whole image."""
+    """(H, W, 3) uint8 sRGB; raises SourceError when it is not a complete image."""
     return np.asarray(cv2.cvtColor(_decode(path, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB), np.uint8)
 
 
 def read_depth(path: Path) -> U16:
-    """(H, W) uint16 sensor integers; raises SourceError for what is no whole 16 bit image of one channel."""
+    """(H, W) uint16 sensor integers; raises SourceError when it is not a complete 16 bit image of one channel."""
     image = _decode(path, cv2.IMREAD_UNCHANGED)
     if image.dtype != np.uint16 or image.ndim != 2:
         channels = image.shape[2] if image.ndim == 3 else 1
@@ -123,7 +123,7 @@ def read_depth(path: Path) -> U16:
     return image
 
 
-def read_pair(color_path: Path, depth_path: Path) -> tuple[U8, U16]:
+def read_color_and_depth(color_path: Path, depth_path: Path) -> tuple[U8, U16]:
     """An aligned colour and depth pair of one size; raises SourceError."""
     color, depth = read_color(color_path), read_depth(depth_path)
     if color.shape[:2] != depth.shape:
@@ -151,15 +151,15 @@ def _decode(path: Path, flag: int) -> NDArray[Any]:
         data = np.fromfile(path, np.uint8)
     except OSError as error:
         raise SourceError(f"{path}: cannot be read: {_reason(error)}") from None
-    # refused before decoding: OpenCV fills what is missing of some cut files, and libpng prints a line of its own
-    image = cv2.imdecode(data, flag) if _is_whole(data.tobytes()) else None
+    # refused before decoding: OpenCV fills what is missing of some truncated files, and libpng prints a line itself
+    image = cv2.imdecode(data, flag) if _is_complete(data.tobytes()) else None
     if image is None:
         raise SourceError(f"{path}: not a whole image ({data.size} bytes): truncated or damaged")
     return np.asarray(image)
 
 
-def _is_whole(data: bytes) -> bool:
-    """Whether a PNG or JPEG has its end mark; other formats are left to their decoder, nothing is no image."""
+def _is_complete(data: bytes) -> bool:
+    """Whether a PNG or JPEG has its end mark; other formats only need some content, their decoder checks them."""
     if data.startswith(b"\x89PNG"):
         return data.endswith(b"IEND\xaeB`\x82")
     if data.startswith(b"\xff\xd8"):
