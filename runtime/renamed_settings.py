@@ -5,6 +5,7 @@ from __future__ import annotations
 # `<node>.<path of keys>` to the new path; one line each, in alphabetical order
 RENAMED_SETTINGS = {
     "fusion.least_score": "fusion.min_score",
+    "fusion.sight": "fusion.visibility",
     "fusion.submap.least_move_m": "fusion.submap.min_move_m",
     "fusion.submap.least_turn_deg": "fusion.submap.min_turn_deg",
     "hierarchy.locations.least_area_m2": "hierarchy.locations.min_area_m2",
