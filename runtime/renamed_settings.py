@@ -11,6 +11,7 @@ RENAMED_SETTINGS = {
     "hierarchy.locations.least_area_m2": "hierarchy.locations.min_area_m2",
     "hierarchy.locations.least_objects": "hierarchy.locations.min_objects",
     "hierarchy.rooms.least_slice_m": "hierarchy.rooms.min_slice_m",
+    "hierarchy.travel": "hierarchy.traversability",
     "pose.rgbd.least_inliers": "pose.rgbd.min_inliers",
     "pose.rgbd.least_met": "pose.rgbd.min_met",
     "pose.rgbd.least_share": "pose.rgbd.min_share",

@@ -147,7 +147,7 @@ def test_comparisons_grow_with_neighbours_and_not_with_all_objects(monkeypatch):
         calls += 1
         return shares(self, *args)
 
-    monkeypatch.setattr(ObjectMap, "_shares", counting)
+    monkeypatch.setattr(ObjectMap, "_overlap_shares", counting)
     for k in range(100):
         objects.add([surface((2.0 * k, 0, 0), (2.0 * k + 0.2, 0.2, 0.2), "cup")], KeyframeStamp(k, k))
     objects.merge_duplicates(0)
