@@ -20,7 +20,7 @@ def points(cloud):
     return cloud.values[:, :3] / cloud.values[:, 6:7]
 
 
-def test_parts_follow_their_submaps():
+def test_voxels_follow_their_submaps():
     poses = {}
     cloud = ObjectCloud(*view(0.0), 0, VoxelContext(0.025, poses))
     cloud.add(*view(1.0), 1)
@@ -30,7 +30,7 @@ def test_parts_follow_their_submaps():
     assert np.allclose(np.sort(points(cloud)[:, 0]), np.r_[view(0.0)[1][:, 0], view(1.0)[1][:, 0] + 0.5])
 
 
-def test_what_is_claimed_stays_known_through_a_move():
+def test_mask_shares_are_kept_through_a_move():
     poses = {}
     cloud = ObjectCloud(*view(), 0, VoxelContext(0.025, poses))
     cloud.count_visible(cloud.keys[:5])
@@ -51,7 +51,7 @@ def test_removed_voxels_stay_removed_through_a_move():
     assert len(cloud.keys) == 8
 
 
-def test_the_oldest_parts_become_one_and_no_point_is_lost():
+def test_the_oldest_submaps_are_merged_and_no_point_is_lost():
     poses = {}
     cloud = ObjectCloud(*view(), 0, VoxelContext(0.025, poses))
     for submap in range(1, 3 * MAX_SUBMAPS_PER_OBJECT):

@@ -18,7 +18,7 @@ def block(low=0.0):
     return low + np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
 
 
-def test_one_point_is_its_own_solid():
+def test_geometry_of_one_point():
     points, color, *_ = ObjectInstance(0, seen(np.full((1, 3), 0.5)), 0, 0).geometry(0.075, 10)
     assert np.allclose(points, 0.5) and color.tolist() == [10, 20, 30]
 
@@ -47,7 +47,7 @@ def test_a_small_leak_onto_the_background_goes():
     assert instance.geometry(0.075, 5)[0][:, 0].max() < 0.2
 
 
-def test_absorbing_adds_views_and_votes():
+def test_merging_adds_views_and_votes():
     a, b = ObjectInstance(0, seen(block(), "cup"), 0, 3), ObjectInstance(1, seen(block(), "mug", 0.7), 1, 9)
     a.merge(b)
     assert a.observations == 2 and (a.first_frame, a.last_frame) == (3, 9)

@@ -7,13 +7,13 @@ from placegraph.runtime.errors import SchemaError
 VOXEL = np.full(3, 0.05)
 
 
-def test_pack_and_unpack_give_the_cell_centre():
+def test_the_center_of_a_points_voxel():
     xyz = np.array([[0.01, -0.01, 7.32], [-3.0, 0.05, -0.05]])
     assert np.allclose(voxel_centers(voxel_keys(xyz, 0.05), 0.05), [[0.025, -0.025, 7.325], [-2.975, 0.075, -0.025]])
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
-def test_points_that_cannot_be_packed_are_refused(bad):
+def test_points_without_a_voxel_key_are_refused(bad):
     with pytest.raises(SchemaError, match="not finite or more than"):
         voxel_keys(np.array([[0.0, bad, 0.0]]), 0.05)
 
@@ -36,7 +36,7 @@ def test_a_cell_keeps_its_row_whatever_comes_later():
     assert index.rows(np.zeros(0, np.int64)).shape == (0,)
 
 
-def test_near_gives_what_the_camera_may_see_and_not_what_is_behind_it():
+def test_rows_in_frustum_are_what_the_camera_may_see_and_not_what_is_behind_it():
     index = VoxelIndex(VOXEL)
     xyz = np.array([[x, 0.0, 1.0] for x in np.arange(-20, 20, 0.25)])
     keys = np.unique(voxel_keys(xyz, 0.05))

@@ -15,7 +15,7 @@ def test_nothing():
     one = layer()
     one.add(np.zeros(0, np.int64), ones(0), 0)
     one.remove(np.zeros(0, np.int64))
-    one.close()
+    one.close_submap()
     one.move_submap(7, np.eye(4))
     assert len(one) == 0
 
@@ -41,10 +41,10 @@ def test_cells_that_every_submap_has_lost_leave_no_submap_behind():
     one.add(keys, ones(5), 0)
     one.add(keys, ones(5), 1)
     one.remove(one.occupied_rows())
-    one.close()
+    one.close_submap()
     assert len(one) == 0 and list(one._by_submap) == [1]  # the open one, which is empty
     assert all(len(keys) == 0 for keys, _ in one._by_submap[1].pieces)
 
 
-def test_grown_arrays_keep_what_they_hold():
+def test_enlarged_arrays_keep_what_they_hold():
     assert with_capacity(np.array([1, 2]), 4, -1).tolist() == [1, 2, -1, -1]

@@ -81,7 +81,7 @@ def turned(degrees, shift):
 
 def test_a_submap_that_is_moved_and_moved_back_leaves_no_trace():
     random = np.random.default_rng(1)
-    voxels, still = VoxelMap(0.05, keep=True), VoxelMap(0.05, keep=True)
+    voxels, still = VoxelMap(0.05, keep_submaps=True), VoxelMap(0.05, keep_submaps=True)
     for submap in range(3):
         xyz, rgb = random.uniform(0, 1, (3000, 3)), random.integers(0, 255, (3000, 3)).astype(np.uint8)
         for one in (voxels, still):
@@ -94,7 +94,7 @@ def test_a_submap_that_is_moved_and_moved_back_leaves_no_trace():
 
 
 def test_moved_free_space_neither_grows_nor_shrinks():
-    free = FreeSpace(0.1, 0.5, 0.15, keep=True)
+    free = FreeSpace(0.1, 0.5, 0.15, keep_submaps=True)
     ends = np.array([[3.0, y, z] for y in np.linspace(-2, 2, 60) for z in (0.3, 0.8)])
     free.carve(np.array([0.0, 0.0, 0.6]), ends)
     before = len(free)
@@ -103,7 +103,7 @@ def test_moved_free_space_neither_grows_nor_shrinks():
 
 
 def test_removed_voxels_do_not_come_back_with_a_submap_that_moves():
-    voxels = VoxelMap(0.05, keep=True)
+    voxels = VoxelMap(0.05, keep_submaps=True)
     xyz = np.stack((np.arange(0.025, 2, 0.05), np.zeros(40), np.zeros(40)), axis=1)
     for submap in (0, 1):
         voxels.integrate(xyz, colors(40), submap)

@@ -165,7 +165,7 @@ def test_outline_of_a_rectangle_is_exact():
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_walls_of_a_plan_are_its_walls_of_plan(count: int) -> None:
+def test_pieces_shorter_than_a_wall_are_no_walls(count: int) -> None:
     occupied = np.zeros((60, 60), bool)
     assert not keep_walls(occupied, CONFIG).any()
     occupied[5, 5 : 5 + 40 * count] = True  # two metres of wall

@@ -75,7 +75,7 @@ def test_the_blind_spot_below_the_camera_is_floor_unless_the_ground_falls_away()
     assert at(ground(hole, path=beside, below=spread((1.5, 2.5), (1.5, 2.5), -2.5)).passable, 2, 2)
 
 
-def test_tops_are_those_of_the_highest_below_the_robot_s_height():
+def test_obstacle_levels_are_those_of_the_highest_point_below_the_robot_s_height():
     post = np.array([(2.025, 2.025, z) for z in np.arange(0.2, 0.93, 0.05)])
     lamp = np.array([(1.025, 1.025, z) for z in np.arange(1.8, 2.0, 0.05)])
     tops = ground(np.concatenate((FLOOR, post, lamp))).obstacle_levels

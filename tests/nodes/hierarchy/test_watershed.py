@@ -12,7 +12,7 @@ def flooded(field, parts=lambda neck: True, space=None):
 
 
 @pytest.mark.parametrize("shape", [(0, 0), (1, 1), (3, 0)])
-def test_nothing_to_flood(shape):
+def test_no_cells_at_all(shape):
     assert watershed(np.zeros(shape, np.float32), np.zeros(shape, bool), 1.0, 0.5, lambda neck: True).shape == shape
 
 
