@@ -5,11 +5,13 @@ from __future__ import annotations
 # `<node>.<path of keys>` to the new path; one line each, in alphabetical order
 RENAMED_SETTINGS = {
     "fusion.least_score": "fusion.min_score",
+    "fusion.sight": "fusion.visibility",
     "fusion.submap.least_move_m": "fusion.submap.min_move_m",
     "fusion.submap.least_turn_deg": "fusion.submap.min_turn_deg",
     "hierarchy.locations.least_area_m2": "hierarchy.locations.min_area_m2",
     "hierarchy.locations.least_objects": "hierarchy.locations.min_objects",
     "hierarchy.rooms.least_slice_m": "hierarchy.rooms.min_slice_m",
+    "hierarchy.travel": "hierarchy.traversability",
     "pose.rgbd.coast_s": "pose.rgbd.max_coasting_s",
     "pose.rgbd.features.keypoints": "pose.rgbd.features.max_keypoints",
     "pose.rgbd.features.least_inliers": "pose.rgbd.features.min_inliers",

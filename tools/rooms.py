@@ -13,7 +13,8 @@ import typer
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, areas_of, segment_rooms, walls_of_plan
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.rooms import RoomArea, RoomConfig, keep_walls, room_areas, segment_rooms
 from placegraph.runtime.arrays import Bool
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.scan import FloorRooms, floors_of_scan, read_scan
@@ -93,16 +94,16 @@ def read_map(path: Path, resolution: float | None = None) -> OccupancyMap:
     return OccupancyMap(occupied, free, listed.resolution, listed.origin[:2])
 
 
-def rooms_of_plan(plan: OccupancyMap) -> tuple[Grid, list[RoomArea]]:
+def rooms_of_plan(plan: OccupancyMap) -> tuple[PlanGrid, list[RoomArea]]:
     """Rooms, largest first; the grid's rows run along +y, so bottom up in the image. Source: nodes/hierarchy/rooms.py.
 
     Short pieces of what is occupied are taken for furniture, which is part of its room.
     """
     config = RoomConfig(cell_m=plan.resolution)
     occupied, known = plan.occupied[::-1], (plan.occupied | plan.free)[::-1]
-    labels = segment_rooms(walls_of_plan(occupied, config), known, config)
-    grid = Grid(np.array(plan.origin), plan.resolution, occupied.shape)
-    return grid, areas_of(labels, grid, config)
+    labels = segment_rooms(keep_walls(occupied, config), known, config)
+    grid = PlanGrid(np.array(plan.origin), plan.resolution, occupied.shape)
+    return grid, room_areas(labels, grid, config)
 
 
 def _read_yaml(path: Path) -> MapFile:
@@ -128,7 +129,7 @@ def _write_floors(source: Path, out: Path, resolution: float | None) -> list[tup
     return written
 
 
-def _write_labels(out: Path, source: Path, grid: Grid, found: list[RoomArea]) -> None:
+def _write_labels(out: Path, source: Path, grid: PlanGrid, found: list[RoomArea]) -> None:
     if len(found) > MAX_ROOMS:
         raise SourceError(f"{source}: {len(found)} rooms do not fit a 16 bit image")
     labels = np.zeros(grid.shape, np.uint16)

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floors
-from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, find_rooms
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.rooms import RoomArea, RoomConfig, find_rooms
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.ply import points_of, read_vertices
@@ -30,7 +31,7 @@ class FloorRooms:
     """One floor of a cloud: its heights, the grid of its label image, its rooms, largest first."""
 
     span: FloorSpan
-    grid: Grid
+    grid: PlanGrid
     rooms: list[RoomArea]
 
 

@@ -1,4 +1,4 @@
-"""Fusion: join keyframes with their segments, keep the voxel map and the objects, and give the whole Map."""
+"""Node `fusion`: keyframes and their segments to the voxel map and the objects, published as a whole Map."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pydantic import Field
 
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.fusion.map_message import object_fields
-from placegraph.nodes.fusion.mask_lifting import LiftConfig, lift
-from placegraph.nodes.fusion.object_association import AssociationConfig, Moment, ObjectMap
-from placegraph.nodes.fusion.object_cloud import Ground
-from placegraph.nodes.fusion.object_instance import Instance
+from placegraph.nodes.fusion.mask_lifting import LiftConfig, lift_masks
+from placegraph.nodes.fusion.object_association import AssociationConfig, KeyframeStamp, ObjectMap
+from placegraph.nodes.fusion.object_cloud import VoxelContext
+from placegraph.nodes.fusion.object_instance import ObjectInstance
 from placegraph.nodes.fusion.submaps import SubmapConfig, Submaps
-from placegraph.nodes.fusion.visibility import Sight, SightConfig
+from placegraph.nodes.fusion.visibility import DepthVisibility, VisibilityConfig
 from placegraph.nodes.fusion.voxel_map import FreeSpace, VoxelMap, depth_edges
 from placegraph.runtime.arrays import F32
 from placegraph.runtime.errors import SchemaError
@@ -28,9 +28,11 @@ from placegraph.runtime.vision.geometry import backproject, is_rigid, transform
 class FusionConfig(NodeConfig):
     """Settings of the map."""
 
-    map_every: int = Field(default=10, ge=1)  # keyframes between maps, at least
-    map_share: float = Field(default=0.05, ge=0)  # ... and of all keyframes: what maps cost stays in proportion
-    voxel_m: float = Field(default=0.05, gt=0)  # METHOD section 2
+    map_every: int = Field(default=10, ge=1)  # keyframes between Maps, at least ...
+    map_share: float = Field(
+        default=0.05, ge=0
+    )  # ... and this share of all so far, so that their cost stays in proportion
+    voxel_m: float = Field(default=0.05, gt=0)  # chosen by hand; also the cell of the room layer
     stride: int = Field(default=4, ge=1)  # every 4th pixel each way: 2 cm apart at 3 m, under half a voxel
     max_depth_m: float = Field(default=5.0, gt=0)
     edge_ratio: float = Field(default=0.05, gt=0)  # see depth_edges
@@ -38,22 +40,22 @@ class FusionConfig(NodeConfig):
     free_height_m: float = Field(default=0.5, gt=0)
     free_clearance_m: float = Field(default=0.15, ge=0)  # rays stop short of the surface by more than the depth noise
     min_observations: int = Field(default=3, ge=1)  # ConceptGraphs; an object seen less often is not in the Map
-    # departs: of the keyframes that showed an object, those that must have recognised it. Of house 9002's 156 objects
-    # 18 have less, 17 of them wrong
+    # Of the keyframes that showed an object, those that must have recognised it. Of house 9002's 156 objects 18 have
+    # less, 17 of them wrong.
     recognised_share: float = Field(default=0.5, ge=0, le=1)
-    # of its strongest name, in the mean of the views that recognised it: scores are the detector's, so it is for a
-    # dataflow to say from where on they are to be believed
+    # Of an object's strongest name, the mean over the views that recognised it. Scores are the detector's, so the
+    # dataflow's file sets the value.
     min_score: float = Field(default=0.0, ge=0, le=1)
     lift: LiftConfig = LiftConfig()
     association: AssociationConfig = AssociationConfig()
-    sight: SightConfig = SightConfig()
+    visibility: VisibilityConfig = VisibilityConfig()
     submap: SubmapConfig = SubmapConfig()
 
 
 class FusionNode(Node):
-    """Keyframes and segments to Maps: one every `map_every` keyframes, rarer in a long run, and a final one.
+    """Publishes a Map every `map_every` keyframes, more rarely in a long run, and a final one.
 
-    Where a pose graph gives Corrections, keyframes are fused where it puts them, and the map moves when it does.
+    With a pose graph, keyframes are fused at its corrected poses, and the map moves when it corrects earlier ones.
     """
 
     config_type = FusionConfig
@@ -64,23 +66,26 @@ class FusionNode(Node):
 
     def __init__(self, config: FusionConfig, context: Context) -> None:
         super().__init__(config, context)
-        moves = Correction.__name__ in context.produced_kinds
-        self.inputs = tuple(kind for kind in type(self).inputs if moves or kind is not Correction)
+        takes_corrections = Correction.__name__ in context.produced_kinds
+        self.inputs = tuple(kind for kind in type(self).inputs if takes_corrections or kind is not Correction)
         self._synchronizer = FrameSynchronizer(*(kind for kind in self.inputs if kind is not LastKeyframe))
         self._submaps = Submaps(config.submap)
-        self._voxels = VoxelMap(config.voxel_m, moves)
-        self._free = FreeSpace(config.free_cell_m, config.free_height_m, config.free_clearance_m, moves)
-        ground = Ground(config.lift.voxel_m, self._submaps.world_from_fused if moves else None)
-        self._objects = ObjectMap(TextEncoder().encode, ground, config.association)
-        self._moves: list[Correction] = []  # that are not followed yet, in order
-        self._latest: Message | None = None  # whose frame id and stamp the next Map carries
+        self._voxels = VoxelMap(config.voxel_m, takes_corrections)
+        self._free = FreeSpace(config.free_cell_m, config.free_height_m, config.free_clearance_m, takes_corrections)
+        voxel_context = VoxelContext(config.lift.voxel_m, self._submaps.world_from_fused if takes_corrections else None)
+        self._objects = ObjectMap(TextEncoder().encode, voxel_context, config.association)
+        self._pending_corrections: list[Correction] = []  # not yet applied, in order
+        self._latest: Message | None = None  # the keyframe whose frame id and stamp the next Map carries
         self._last: LastKeyframe | None = None
         self._revision = 0
         self._next_map = config.map_every  # keyframes from the start to the next Map
         self._ended = False
 
     def step(self, message: Message) -> Sequence[Message]:
-        """Fuse what has become complete. Raises SchemaError for a pose that is not rigid, or a keyframe too many."""
+        """Fuse the keyframes that are complete.
+
+        Raises SchemaError for a pose that is not rigid, and for a message after the last keyframe.
+        """
         if self._ended:
             raise SchemaError(f"fusion: {type(message).__name__} of frame {message.frame_id} after the last keyframe")
         maps: list[Message] = []
@@ -88,71 +93,72 @@ class FusionNode(Node):
             self._last = message
         else:
             if isinstance(message, Correction) and len(message.moved_frame_ids):
-                self._moves.append(message)
+                self._pending_corrections.append(message)
             joined = self._synchronizer.add(message)
             if joined is None:
                 return maps
-            self._fuse(*joined)
+            self._fuse_keyframe(*joined)
             if len(self._submaps) >= self._next_map:
-                maps.append(self._map(final=False))
-        fused = -1 if self._latest is None else self._latest.frame_id
-        if self._last is not None and fused >= self._last.frame_id:
-            self._objects.tidy(len(self._submaps) - 1)
-            maps.append(self._map(final=True))
+                maps.append(self._make_map(final=False))
+        fused_frame = -1 if self._latest is None else self._latest.frame_id
+        if self._last is not None and fused_frame >= self._last.frame_id:
+            self._objects.merge_duplicates(len(self._submaps) - 1)
+            maps.append(self._make_map(final=True))
             self._ended = True
         return maps
 
-    def _fuse(self, keyframe: Message, segments: Message, correction: Message | None = None) -> None:
+    def _fuse_keyframe(self, keyframe: Message, segments: Message, correction: Message | None = None) -> None:
         assert isinstance(keyframe, Keyframe) and isinstance(segments, Segments)
         if isinstance(correction, Correction):
-            self._move_up_to(correction.frame_id)
+            self._apply_corrections_until(correction.frame_id)
             keyframe = replace(keyframe, world_from_camera=correction.world_from_camera)
         pose = keyframe.world_from_camera
         if not is_rigid(pose):
             raise SchemaError(f"Keyframe {keyframe.frame_id}: world_from_camera is not a finite rigid transform")
         depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
         edges = depth_edges(depth_m, self.config.edge_ratio)
-        sight = Sight(depth_m, edges, keyframe.intrinsics, pose, self.config.sight)
-        self._voxels.look(sight)
-        self._objects.look(sight)
-        moment = Moment(len(self._submaps), keyframe.frame_id, self._submaps.enter(keyframe.frame_id, pose))
-        self._add_cloud(keyframe, np.where(edges, np.float32(0), depth_m), moment.submap)
-        self._objects.add(lift(keyframe, depth_m, edges, segments, self.config.lift), moment)
-        self._objects.retire(self.config.sight.views, keyframe.frame_id)
+        visibility = DepthVisibility(depth_m, edges, keyframe.intrinsics, pose, self.config.visibility)
+        self._voxels.remove_seen_through(visibility)
+        self._objects.apply_visibility(visibility)
+        submap = self._submaps.add_keyframe(keyframe.frame_id, pose)
+        stamp = KeyframeStamp(len(self._submaps) - 1, keyframe.frame_id, submap)
+        self._fuse_points(keyframe, np.where(edges, np.float32(0), depth_m), submap)
+        self._objects.add(lift_masks(keyframe, depth_m, edges, segments, self.config.lift), stamp)
+        self._objects.retire_absent(self.config.visibility.views, keyframe.frame_id)
         self._latest = keyframe
 
-    def _move_up_to(self, frame_id: int) -> None:
-        """Follow all moves so far, also those told with a keyframe whose segments were lost with a process (live)."""
-        due = [one for one in self._moves if one.frame_id <= frame_id]
-        self._moves = self._moves[len(due) :]
+    def _apply_corrections_until(self, frame_id: int) -> None:
+        """Apply all corrections so far, also of keyframes whose segments were lost with a process in a live run."""
+        due = [correction for correction in self._pending_corrections if correction.frame_id <= frame_id]
+        self._pending_corrections = self._pending_corrections[len(due) :]
         for correction in due:
-            self._move(correction)
+            moves = self._submaps.apply_correction(correction)
+            for layer in (self._voxels, self._free):
+                for submap, world_from_fused in moves.items():
+                    layer.move_submap(submap, world_from_fused)
+            if moves:
+                self._objects.move_submaps(moves, len(self._submaps) - 1)
 
-    def _move(self, correction: Correction) -> None:
-        moves = self._submaps.move(correction)
-        for layer in (self._voxels, self._free):
-            for submap, world_from_fused in moves.items():
-                layer.move(submap, world_from_fused)
-        if moves:
-            self._objects.move(moves, len(self._submaps) - 1)
-
-    def _add_cloud(self, keyframe: Keyframe, clean_m: F32, submap: int) -> None:
+    def _fuse_points(self, keyframe: Keyframe, clean_m: F32, submap: int) -> None:
         c, pose = self.config, keyframe.world_from_camera
-        thin = clean_m[:: c.stride, :: c.stride]
+        sampled_m = clean_m[:: c.stride, :: c.stride]
         xyz = transform(pose, backproject(clean_m, keyframe.intrinsics, c.stride))
-        near = (thin <= c.max_depth_m)[thin > 0]  # in the order of backproject: row by row
-        self._voxels.fuse(xyz[near], keyframe.color[:: c.stride, :: c.stride][thin > 0][near], submap)
+        near = (sampled_m <= c.max_depth_m)[sampled_m > 0]  # in the order of backproject: row by row
+        self._voxels.integrate(xyz[near], keyframe.color[:: c.stride, :: c.stride][sampled_m > 0][near], submap)
         origin = pose[:3, 3]
-        # what lies beyond the trusted range still proves that the space before it is free
-        shorten = np.minimum(1.0, c.max_depth_m / thin[thin > 0])[:, None]
+        # readings beyond the trusted range still prove that the space before them is free
+        shorten = np.minimum(1.0, c.max_depth_m / sampled_m[sampled_m > 0])[:, None]
         self._free.carve(origin, origin + (xyz - origin) * shorten, submap)
 
-    def _is_stable(self, one: Instance) -> bool:
+    def _is_stable(self, instance: ObjectInstance) -> bool:
         c = self.config
-        seen_enough = one.observations >= max(c.min_observations, c.recognised_share * one.chances)
-        return seen_enough and max(one.votes.values()) >= c.min_score * one.observations
+        min_observations = max(c.min_observations, c.recognised_share * instance.times_visible)
+        return (
+            instance.observations >= min_observations
+            and max(instance.votes.values()) >= c.min_score * instance.observations
+        )
 
-    def _map(self, final: bool) -> Map:
+    def _make_map(self, final: bool) -> Map:
         c = self.config
         self._next_map = len(self._submaps) + max(c.map_every, round(c.map_share * len(self._submaps)))
         source = self._latest or self._last

@@ -1,4 +1,4 @@
-"""One object of the map: its voxels, its votes for tags, when it was seen."""
+"""One object of the map: its voxels, its votes for names, and when it was seen."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from scipy.spatial import cKDTree
 
 from placegraph.nodes.fusion.clustering import main_clusters
 from placegraph.nodes.fusion.mask_lifting import Observation
-from placegraph.nodes.fusion.object_cloud import Cloud, Ground
-from placegraph.nodes.fusion.spatial_index import nearer
-from placegraph.nodes.fusion.visibility import SightConfig
+from placegraph.nodes.fusion.object_cloud import ObjectCloud, VoxelContext
+from placegraph.nodes.fusion.spatial_index import is_nearer_to_second
+from placegraph.nodes.fusion.visibility import VisibilityConfig
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool
 from placegraph.runtime.vision.geometry import bounding_box, yaw_box
 
-TRIM_PERCENT = 0.5  # departs: per axis and side, what a box may lose to stray points
-CLAIMED_SHARE = 0.3  # departs: of the views that showed a point and the object, those whose mask must hold the point
-MAIN_SHARE = 0.2  # departs: parts smaller than this share of the largest are leaks of masks onto the background
-ALONE = Ground(voxel_m=0.025)
+# All three were chosen by hand.
+TRIM_PERCENT = 0.5  # of the points, that a box may lose to strays at each end of each axis
+MIN_MASK_SHARE = 0.3  # of the views that saw a point and the object, those whose mask held the point
+MIN_CLUSTER_SHARE = 0.2  # of the largest cluster's size; smaller clusters are leaks of masks onto the background
+STATIC_CONTEXT = VoxelContext(voxel_m=0.025)
 
 
-class Solid(NamedTuple):
-    """What of an object can be believed: points (M, 3) m, world; median colour (3,); its boxes, see geometry."""
+class ObjectGeometry(NamedTuple):
+    """The trusted part of an object: points (M, 3) m, world; median colour (3,); its boxes as in vision.geometry."""
 
     points: F32
     color: U8
@@ -31,96 +32,102 @@ class Solid(NamedTuple):
     oriented_box: F32
 
 
-class Instance:
-    """An object as fusion knows it; grows by observations and by merging with another."""
+class ObjectInstance:
+    """An object as fusion knows it; it grows by observations and by merging with another."""
 
     def __init__(
-        self, number: int, first: Observation, keyframe: int, frame_id: int, submap: int = 0, ground: Ground = ALONE
+        self,
+        object_id: int,
+        observation: Observation,
+        keyframe: int,
+        frame_id: int,
+        submap: int = 0,
+        context: VoxelContext = STATIC_CONTEXT,
     ) -> None:
-        self.number = number  # of its id, never reused
-        self.cloud = Cloud(first.keys, first.values, submap, ground)
-        self.votes: dict[str, float] = {first.name: first.score}
+        self.object_id = object_id  # never reused
+        self.cloud = ObjectCloud(observation.keys, observation.values, submap, context)
+        self.votes: dict[str, float] = {observation.name: observation.score}
         self.observations = 1
         self.first_frame = self.last_frame = frame_id
         self.last_keyframe = keyframe  # counted from 0 over the run
-        self.chances = 1  # keyframes that showed it, whether or not it was recognised
-        self._in_sight: I64 = np.zeros(0, np.int64)  # its voxels that the latest keyframe saw
-        self.absences = 0  # keyframes that saw through most of it since it was last seen
-        self.gaps = 0  # views that showed two things with a gap between them, less those that showed one
-        self.sides: tuple[F64, F64] = (np.zeros((0, 3)), np.zeros((0, 3)))  # as the last such view had them
+        self.times_visible = 1  # keyframes that showed it, whether or not it was recognised
+        self.times_absent = 0  # keyframes that saw through most of it since it was last seen
+        self.split_votes = 0  # views that showed two objects with a gap between them, less those that showed one
+        self.split_sides: tuple[F64, F64] = (np.zeros((0, 3)), np.zeros((0, 3)))  # the two, in the last such view
         self.revision = 0
+        self._visible_keys: I64 = np.zeros(0, np.int64)  # its voxels that the latest keyframe saw
         self._refresh()
 
-    def look_away(self) -> None:
-        """The next keyframe may not show it: what the last one saw is no longer in sight."""
-        self._in_sight = self._in_sight[:0]
+    def clear_visible(self) -> None:
+        """Forget which voxels the last keyframe saw: the next one may not show the object."""
+        self._visible_keys = self._visible_keys[:0]
 
-    def update(self, seen: Observation, keyframe: int, frame_id: int, submap: int = 0) -> None:
-        """Add one view; a second mask of the same keyframe adds points and votes but is no further observation."""
+    def update(self, observation: Observation, keyframe: int, frame_id: int, submap: int = 0) -> None:
+        """Add one view. A second mask of the same keyframe adds points and votes but counts as no further view."""
         if keyframe != self.last_keyframe:
             self.observations += 1
-            self.cloud.show(self._in_sight)
+            self.cloud.count_visible(self._visible_keys)
         self.last_keyframe, self.last_frame = keyframe, frame_id
-        self.absences = 0
-        self.votes[seen.name] = self.votes.get(seen.name, 0.0) + seen.score
-        self.cloud.add(seen.keys, seen.values, submap)
+        self.times_absent = 0
+        self.votes[observation.name] = self.votes.get(observation.name, 0.0) + observation.score
+        self.cloud.add(observation.keys, observation.values, submap)
         self._refresh()
 
-    def absorb(self, other: Instance) -> None:
-        """Take over another instance's points, votes and views."""
-        self.observations += other.observations
-        self.chances = max(self.chances, other.chances)
-        self.first_frame = min(self.first_frame, other.first_frame)
-        self.last_frame = max(self.last_frame, other.last_frame)
-        self.last_keyframe = max(self.last_keyframe, other.last_keyframe)
-        self.absences = 0
-        for name, votes in other.votes.items():
+    def merge(self, duplicate: ObjectInstance) -> None:
+        """Take over a duplicate's points, votes and views."""
+        self.observations += duplicate.observations
+        self.times_visible = max(self.times_visible, duplicate.times_visible)
+        self.first_frame = min(self.first_frame, duplicate.first_frame)
+        self.last_frame = max(self.last_frame, duplicate.last_frame)
+        self.last_keyframe = max(self.last_keyframe, duplicate.last_keyframe)
+        self.times_absent = 0
+        for name, votes in duplicate.votes.items():
             self.votes[name] = self.votes.get(name, 0.0) + votes
-        self.cloud.absorb(other.cloud)
+        self.cloud.merge(duplicate.cloud)
         self._refresh()
 
-    def split(self, number: int) -> Instance:
-        """Give what lies nearer to the second of its sides to a new instance, with the same votes and views."""
-        second = nearer(self.points, self.sides)
-        other = copy(self)
-        other.number, other.votes, other.cloud = number, dict(self.votes), self.cloud.copy()
-        other.cloud.remove(~second)
+    def split(self, object_id: int) -> ObjectInstance:
+        """Move the points nearer to the second of `split_sides` to a new object with the same votes and views."""
+        second = is_nearer_to_second(self.points, self.split_sides)
+        new = copy(self)
+        new.object_id, new.votes, new.cloud = object_id, dict(self.votes), self.cloud.copy()
+        new.cloud.remove(~second)
         self.cloud.remove(second)
-        for one in (self, other):
-            one.gaps = 0
-            one._refresh()
-        return other
+        for instance in (self, new):
+            instance.split_votes = 0
+            instance._refresh()
+        return new
 
-    def follow(self) -> None:
-        """Lie where the submaps lie now."""
-        self.absences = 0
-        self.cloud.place_again()
+    def reintegrate(self) -> None:
+        """Follow submaps that have moved."""
+        self.times_absent = 0
+        self.cloud.reintegrate()
         self._refresh()
 
-    def look(self, through: Bool, there: Bool, config: SightConfig) -> None:
-        """Take what one keyframe says of each point (N,): most of what it can tell about is there, or has gone.
+    def apply_visibility(self, seen_through: Bool, seen: Bool, config: VisibilityConfig) -> None:
+        """Count what one keyframe shows of each point (N,): the object is there, or it is absent.
 
-        Points of a thing that is there go when they have been seen through in so many keyframes: it has been moved by
-        less than its size, or they never were part of it.
+        Of an object that is there, points go that `config.views` more keyframes have seen through than seen: it was
+        moved by less than its size, or they were never part of it.
         """
         cloud = self.cloud
-        self._in_sight = cloud.keys[there]
-        self.chances += 2 * int(there.sum()) >= len(there)
-        told = int(through.sum() + there.sum())
-        if told < config.visible_share * len(through):
+        self._visible_keys = cloud.keys[seen]
+        self.times_visible += 2 * int(seen.sum()) >= len(seen)
+        observed = int(seen_through.sum() + seen.sum())
+        if observed < config.visible_share * len(seen_through):
             return
-        cloud.seen_through[through & (cloud.seen_through < config.views)] += 1
-        cloud.seen_through[there & (cloud.seen_through > 0)] -= 1
-        if through.sum() >= config.through_share * told:
-            self.absences += 1
+        cloud.seen_through[seen_through & (cloud.seen_through < config.views)] += 1
+        cloud.seen_through[seen & (cloud.seen_through > 0)] -= 1
+        if seen_through.sum() >= config.through_share * observed:
+            self.times_absent += 1
             return
-        self.absences = 0
-        gone = cloud.seen_through >= config.views
-        if gone.any() and not gone.all():
-            cloud.remove(gone)
+        self.times_absent = 0
+        removed = cloud.seen_through >= config.views
+        if removed.any() and not removed.all():
+            cloud.remove(removed)
             self._refresh()
 
-    def tags(self) -> list[tuple[str, float]]:
+    def ranked_votes(self) -> list[tuple[str, float]]:
         """Names with their summed scores, strongest first, then by name."""
         return sorted(self.votes.items(), key=lambda vote: (-vote[1], vote[0]))
 
@@ -134,32 +141,32 @@ class Instance:
         self.box: F32 = bounding_box(self.points)
         self.revision += 1
         self._tree: cKDTree | None = None
-        self._solid: Solid | None = None
+        self._geometry: ObjectGeometry | None = None
 
     @property
     def tree(self) -> cKDTree:
-        """KD-tree of all points, built when first asked for."""
+        """KD-tree of all points, built at the first request."""
         if self._tree is None:
             self._tree = cKDTree(self.points)
         return self._tree
 
-    def solid(self, eps: float, min_points: int) -> Solid:
-        """The points that can be believed, their colour and boxes.
+    def geometry(self, eps: float, min_points: int) -> ObjectGeometry:
+        """The points that can be trusted, their colour and boxes.
 
-        Points go that few of the masks held though the camera saw them, then parts far smaller than the main one, then
-        `TRIM_PERCENT` at each end of each axis.
+        Removed are points that the camera saw but few masks held, clusters far smaller than the main one, and
+        `TRIM_PERCENT` of the points at each end of each axis.
         """
-        if self._solid is None:
-            # colour and depth of most cameras are a few pixels apart: what masks drag in from behind changes with the
-            # viewpoint, the thing itself does not
-            kept = np.flatnonzero(self.cloud.claimed() >= CLAIMED_SHARE)
+        if self._geometry is None:
+            # Colour and depth of most cameras are a few pixels apart. What masks therefore take from the background
+            # changes with the viewpoint, the object does not.
+            kept = np.flatnonzero(self.cloud.mask_shares() >= MIN_MASK_SHARE)
             kept = kept if len(kept) else np.arange(len(self.points))
-            main = main_clusters(self.points[kept], eps, min_points, MAIN_SHARE)
+            main = main_clusters(self.points[kept], eps, min_points, MIN_CLUSTER_SHARE)
             kept = kept[main] if len(main) else kept
             low, high = np.percentile(self.points[kept], (TRIM_PERCENT, 100 - TRIM_PERCENT), axis=0)
             kept = kept[((self.points[kept] >= low) & (self.points[kept] <= high)).all(axis=1)]
             colors = self.values[kept, 3:6] / self.values[kept, 6:7]
             points = self.points[kept].astype(np.float32)
             color = np.median(colors, axis=0).round().astype(np.uint8)
-            self._solid = Solid(points, color, bounding_box(points), yaw_box(points))
-        return self._solid
+            self._geometry = ObjectGeometry(points, color, bounding_box(points), yaw_box(points))
+        return self._geometry

@@ -1,4 +1,4 @@
-"""What one depth image says about points of the map: they are there, something is seen behind them, or neither."""
+"""Which points of the map one depth image sees, which it sees through, and which it says nothing about."""
 
 from __future__ import annotations
 
@@ -6,29 +6,32 @@ import cv2
 import numpy as np
 from pydantic import BaseModel, Field
 
-from placegraph.nodes.fusion.voxel_index import CellIndex
+from placegraph.nodes.fusion.voxel_index import VoxelIndex
 from placegraph.runtime.arrays import F32, F64, I32, Bool, Points
 from placegraph.runtime.vision.geometry import inverse, transform
 
 
-class SightConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """When a camera sees through a place, and when what stood there has gone."""
+class VisibilityConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+    """When a camera sees through a place, and when an object that stood there is absent."""
 
-    margin_m: float = Field(default=0.1, gt=0)  # departs: two voxels of the cloud, for errors of poses
-    # departs: three sigma of an OAK-D: .09 px of disparity, focal length 460 px and baseline 7.5 cm make .0026 m at 1 m
+    margin_m: float = Field(default=0.1, gt=0)  # two voxels of the cloud, for errors of poses
+    # Three standard deviations of an OAK-D: .09 px of disparity, focal length 460 px and baseline 7.5 cm give .0026 m
+    # at 1 m, growing with the square of the depth.
     margin_per_m2: float = Field(default=0.008, ge=0)
-    around_px: int = Field(default=4, ge=0)  # nothing so near in the picture may be closer: thin things are kept
-    reach_m: float = Field(default=4.0, gt=0)  # departs: beyond, the margin is larger than a chair
-    views: int = Field(default=4, ge=1, le=255)  # departs: keyframes that must see through; two may look from one place
-    visible_share: float = Field(default=0.25, ge=0, le=1)  # of an object's points, that a view must tell about
-    through_share: float = Field(default=0.7, ge=0.5, le=1)  # of those, that it must see through
+    around_px: int = Field(default=4, ge=0)  # no reading within so many pixels may be closer: keeps thin things
+    reach_m: float = Field(default=4.0, gt=0)  # beyond, the margin is larger than a chair
+    views: int = Field(default=4, ge=1, le=255)  # keyframes that must see through; two may be taken from one place
+    visible_share: float = Field(default=0.25, ge=0, le=1)  # of an object's points, that a view must see or see through
+    through_share: float = Field(default=0.7, ge=0.5, le=1)  # of these, that it must see through
 
 
-class Sight:
-    """One keyframe's depth, ready to judge points."""
+class DepthVisibility:
+    """One keyframe's depth image, ready to classify points."""
 
-    def __init__(self, depth_m: F32, edges: Bool, intrinsics: F64, world_from_camera: F64, config: SightConfig) -> None:
-        """depth_m: (H, W) metres, 0 = no reading; edges: (H, W), not believed; intrinsics: (4,) fx fy cx cy in px."""
+    def __init__(
+        self, depth_m: F32, edges: Bool, intrinsics: F64, world_from_camera: F64, config: VisibilityConfig
+    ) -> None:
+        """depth_m: (H, W) metres, 0 = no reading; edges: (H, W), not trusted; intrinsics: (4,) fx fy cx cy in px."""
         self.config = config
         self._depth_m = np.where(edges, np.float32(0), depth_m)
         kernel = np.ones((2 * config.around_px + 1,) * 2, np.uint8)
@@ -41,17 +44,17 @@ class Sight:
 
     @property
     def box(self) -> F32:
-        """(2, 3) metres, world frame, around all that is within reach."""
+        """(2, 3) metres, world frame: contains everything within reach."""
         position = -self._camera_from_world[:3, :3].T @ self._camera_from_world[:3, 3]
         reach = self.config.reach_m * float(np.linalg.norm((1.0, *self._slopes)))
         return np.stack((position - reach, position + reach)).astype(np.float32)
 
-    def rows_in_view(self, index: CellIndex) -> I32:
-        """Rows of cells that may be in the picture, within reach."""
-        return index.near(self._camera_from_world, self._slopes, self.config.reach_m)
+    def rows_in_view(self, index: VoxelIndex) -> I32:
+        """Rows of the voxels that may be in view and within reach."""
+        return index.rows_in_frustum(self._camera_from_world, self._slopes, self.config.reach_m)
 
     def box_in_view(self, box_world: Points) -> bool:
-        """Whether a (2, 3) box may reach into the picture, within reach: its bounding sphere is tried."""
+        """Whether the sphere around a (2, 3) box may reach into the view, within reach."""
         x, y, z = transform(self._camera_from_world, box_world.mean(axis=0)[None])[0].tolist()
         radius = float(np.linalg.norm(box_world[1] - box_world[0])) / 2
         if not -radius < z < self.config.reach_m + radius:
@@ -61,19 +64,19 @@ class Sight:
             for across, slope in zip((x, y), self._slopes, strict=True)
         )
 
-    def judge(self, points_world: Points) -> tuple[Bool, Bool]:
-        """Which of (N, 3) points the camera sees through, and which it sees; the others are hidden or out of view."""
+    def classify(self, points_world: Points) -> tuple[Bool, Bool]:
+        """Two masks (N,) of points (N, 3): seen through, and seen. Points in neither are hidden or out of view."""
         height, width = self._depth_m.shape
         fx, fy, cx, cy = self._intrinsics
         x, y, z = transform(self._camera_from_world, points_world).T
         ahead = (z > 0.05) & (z < self.config.reach_m)
-        deep = np.where(ahead, z, 1.0)
-        u, v = np.rint(x / deep * fx + cx), np.rint(y / deep * fy + cy)
-        inside = np.flatnonzero(ahead & (u >= 0) & (u < width) & (v >= 0) & (v < height))
-        rows, columns, z = v[inside].astype(int), u[inside].astype(int), z[inside]
+        z_ahead = np.where(ahead, z, 1.0)
+        u, v = np.rint(x / z_ahead * fx + cx), np.rint(y / z_ahead * fy + cy)
+        in_image = np.flatnonzero(ahead & (u >= 0) & (u < width) & (v >= 0) & (v < height))
+        rows, columns, z = v[in_image].astype(int), u[in_image].astype(int), z[in_image]
         measured, nearest = self._depth_m[rows, columns], self._nearest_m[rows, columns]
         margin = self.config.margin_m + self.config.margin_per_m2 * z * z
-        through, there = np.zeros(len(points_world), bool), np.zeros(len(points_world), bool)
-        through[inside] = (measured > 0) & (nearest > z + margin)
-        there[inside] = (measured > 0) & (np.abs(measured - z) <= margin)
-        return through, there
+        seen_through, seen = np.zeros(len(points_world), bool), np.zeros(len(points_world), bool)
+        seen_through[in_image] = (measured > 0) & (nearest > z + margin)
+        seen[in_image] = (measured > 0) & (np.abs(measured - z) <= margin)
+        return seen_through, seen

@@ -1,4 +1,4 @@
-"""Cells of space named by packed indices, and an index that finds the row of each, however large the map is."""
+"""Voxel keys (one integer for each voxel of space) and an index from keys to rows whose cost follows the view."""
 
 from __future__ import annotations
 
@@ -12,38 +12,44 @@ from placegraph.runtime.errors import SchemaError
 
 D = TypeVar("D", bound=np.generic)
 
-_BITS = 21  # a cell index of each axis; three fit an int64
-_HALF = 1 << (_BITS - 1)
-_ALL = (1 << _BITS) - 1
-_BLOCK = 32  # cells of a block along each axis: some fifty blocks in a camera's view of a room
-_INSIDE = _BLOCK - 1
-_BLOCK_OF = ~((_INSIDE << (2 * _BITS)) | (_INSIDE << _BITS) | _INSIDE)  # what of a key names its block
+_BITS = 21  # for the voxel index along each axis; three of them fit an int64
+_AXIS_OFFSET = 1 << (_BITS - 1)
+_AXIS_MASK = (1 << _BITS) - 1
+_BLOCK = 32  # voxels along each side of a block: a camera's view of a room touches about fifty blocks
+_IN_BLOCK = _BLOCK - 1
+_BLOCK_MASK = ~((_IN_BLOCK << (2 * _BITS)) | (_IN_BLOCK << _BITS) | _IN_BLOCK)  # the part of a key that names the block
 
 
-def pack(xyz: Points, cell_m: Points | float) -> I64:
-    """(N, 3) metres to one int64 per point that names its cell of size `cell_m` (a number, or one per axis).
+def voxel_keys(xyz: Points, cell_m: Points | float) -> I64:
+    """Keys (N,) of the voxels that hold points (N, 3) in metres; `cell_m`: one size, or one for each axis.
 
-    Raises SchemaError for points that are not finite or lie further out than 2**20 cells.
+    Raises SchemaError for points that are not finite or more than 2**20 voxels from the origin.
     """
     cells = np.floor(np.asarray(xyz, float) / cell_m)
-    if not (np.abs(cells) < _HALF).all():  # also false for NaN
-        raise SchemaError(f"a point of the map is not finite or more than {_HALF} cells of {cell_m} m from the origin")
-    x, y, z = (cells.astype(np.int64) + _HALF).T
+    if not (np.abs(cells) < _AXIS_OFFSET).all():  # also false for NaN
+        raise SchemaError(
+            f"a point of the map is not finite or more than {_AXIS_OFFSET} cells of {cell_m} m from the origin"
+        )
+    return _pack(cells.astype(np.int64))
+
+
+def _pack(cells: I64) -> I64:
+    x, y, z = (cells + _AXIS_OFFSET).T
     return np.asarray((x << (2 * _BITS)) | (y << _BITS) | z)
 
 
-def corners(keys: I64) -> I64:
-    """Whole-numbered low corners (N, 3) of packed cells, in cells."""
-    return np.stack((keys >> (2 * _BITS), (keys >> _BITS) & _ALL, keys & _ALL), axis=1) - _HALF
+def voxel_corners(keys: I64) -> I64:
+    """Lowest corners (N, 3) of voxels, in whole voxels."""
+    return np.stack((keys >> (2 * _BITS), (keys >> _BITS) & _AXIS_MASK, keys & _AXIS_MASK), axis=1) - _AXIS_OFFSET
 
 
-def unpack(keys: I64, cell_m: Points | float) -> F64:
-    """Centres (N, 3) in metres of packed cells."""
-    return np.asarray((corners(keys) + 0.5) * cell_m)
+def voxel_centers(keys: I64, cell_m: Points | float) -> F64:
+    """Centres (N, 3) of voxels in metres."""
+    return np.asarray((voxel_corners(keys) + 0.5) * cell_m)
 
 
 def sum_by_key(keys: I64, values: NDArray[D]) -> tuple[I64, NDArray[D]]:
-    """Add up the rows of values (N, D) that share a key: (sorted unique keys (M,), sums (M, D))."""
+    """Sums of the rows of values (N, D) that share a key: sorted unique keys (M,) and sums (M, D)."""
     if not len(keys):
         return keys, values
     order = np.argsort(keys, kind="stable")
@@ -52,69 +58,69 @@ def sum_by_key(keys: I64, values: NDArray[D]) -> tuple[I64, NDArray[D]]:
     return ordered[starts], np.add.reduceat(values[order], starts, axis=0)
 
 
-def block_of(keys: I64) -> I64:
-    """The names (N,) of the blocks of 32 cells each way in which packed cells lie."""
-    return keys & _BLOCK_OF
+def block_keys(keys: I64) -> I64:
+    """For each voxel key (N,) the key of its block of 32 x 32 x 32 voxels."""
+    return keys & _BLOCK_MASK
 
 
-class CellIndex:
-    """Which row belongs to a cell; rows are counted from 0 in the order in which cells first came.
+class VoxelIndex:
+    """Maps voxel keys to rows, numbered from 0 in the order in which voxels first came.
 
-    Cells are kept by blocks of 32 cells each way, sorted within: looking up costs what the blocks in view hold,
-    whatever else there is, and 12 bytes a cell.
+    Keys are sorted within blocks. A lookup costs what the touched blocks hold, however large the map is; memory is
+    12 bytes a voxel.
     """
 
     def __init__(self, cell_m: F64) -> None:
         self._block_m = cell_m * _BLOCK
-        self._blocks: dict[int, tuple[I64, I32]] = {}
+        self._blocks: dict[int, tuple[I64, I32]] = {}  # sorted keys and their rows
         self._count = 0
 
     def __len__(self) -> int:
         return self._count
 
     def rows(self, keys: I64) -> I32:
-        """The row (N,) of each of the sorted unique keys (N,); unknown cells get new ones."""
+        """Rows (N,) of sorted unique keys (N,); unknown voxels get new rows."""
         rows = np.empty(len(keys), np.int32)
         if not len(keys):
             return rows
-        blocks = block_of(keys)
+        blocks = block_keys(keys)
         order = np.argsort(blocks, kind="stable")  # keys stay sorted within a block
         ordered = blocks[order]
         starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
         for start, end in zip(starts.tolist(), [*starts[1:].tolist(), len(keys)], strict=True):
-            here = order[start:end]
-            rows[here] = self._rows_of_block(int(ordered[start]), keys[here])
+            in_block = order[start:end]
+            rows[in_block] = self._rows_of_block(int(ordered[start]), keys[in_block])
         return rows
 
     def _rows_of_block(self, block: int, keys: I64) -> I32:
-        known, rows = self._blocks.get(block, (np.zeros(0, np.int64), np.zeros(0, np.int32)))
-        at = np.searchsorted(known, keys)
-        new = at == len(known)
-        new[~new] = known[at[~new]] != keys[~new]
+        known_keys, known_rows = self._blocks.get(block, (np.zeros(0, np.int64), np.zeros(0, np.int32)))
+        at = np.searchsorted(known_keys, keys)
+        new = at == len(known_keys)
+        new[~new] = known_keys[at[~new]] != keys[~new]
         if new.any():
-            fresh = np.arange(self._count, self._count + int(new.sum()), dtype=np.int32)
-            self._count += len(fresh)
-            known, rows = np.insert(known, at[new], keys[new]), np.insert(rows, at[new], fresh)
-            self._blocks[block] = known, rows
-            at = np.searchsorted(known, keys)
-        return rows[at]
+            new_rows = np.arange(self._count, self._count + int(new.sum()), dtype=np.int32)
+            self._count += len(new_rows)
+            known_keys = np.insert(known_keys, at[new], keys[new])
+            known_rows = np.insert(known_rows, at[new], new_rows)
+            self._blocks[block] = known_keys, known_rows
+            at = np.searchsorted(known_keys, keys)
+        return known_rows[at]
 
-    def near(self, camera_from_world: F64, slopes: tuple[float, float], reach_m: float) -> I32:
-        """Rows of the blocks that a camera may see, in a fixed order.
+    def rows_in_frustum(self, camera_from_world: F64, slopes: tuple[float, float], reach_m: float) -> I32:
+        """Rows of all blocks that may reach into a camera's view, in a fixed order.
 
-        slopes: of the picture's widest rays, |x| / z and |y| / z; reach_m: how far along z.
+        slopes: largest |x| / z and |y| / z in the image; reach_m: how far the view goes along z.
         """
         position = -camera_from_world[:3, :3].T @ camera_from_world[:3, 3]
         reach = reach_m * float(np.linalg.norm((1.0, *slopes)))
         low, high = (np.floor((position + sign * reach) / self._block_m).astype(int) for sign in (-1, 1))
         grid = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
-        cells = grid.reshape(-1, 3)
-        x, y, z = camera_from_world[:3, :3] @ ((cells + 0.5) * self._block_m).T + camera_from_world[:3, 3:]
+        blocks = grid.reshape(-1, 3)
+        x, y, z = camera_from_world[:3, :3] @ ((blocks + 0.5) * self._block_m).T + camera_from_world[:3, 3:]
         radius = float(np.linalg.norm(self._block_m)) / 2
-        seen = (z > -radius) & (z < reach_m + radius)
+        in_view = (z > -radius) & (z < reach_m + radius)
         for across, slope in ((x, slopes[0]), (y, slopes[1])):
-            seen &= np.abs(across) - slope * np.maximum(z, 0) < radius * np.hypot(1, slope)
-        x_, y_, z_ = (cells[seen] * _BLOCK + _HALF).T
-        names = ((x_ << (2 * _BITS)) | (y_ << _BITS) | z_).tolist()
-        found = [self._blocks[name][1] for name in names if name in self._blocks]
-        return np.concatenate(found) if found else np.zeros(0, np.int32)
+            in_view &= np.abs(across) - slope * np.maximum(z, 0) < radius * np.hypot(1, slope)
+        keys = _pack(blocks[in_view] * _BLOCK).tolist()
+        rows = [self._blocks[key][1] for key in keys if key in self._blocks]
+        return np.concatenate(rows) if rows else np.zeros(0, np.int32)

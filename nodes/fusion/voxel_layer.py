@@ -1,10 +1,10 @@
-"""A layer of the map: whole numbers summed by cell, kept by submap as well where the map may have to move.
+"""Integer sums by voxel, kept by submap as well where the map may have to move after a loop closure.
 
-Sums of whole numbers are exact, so what a submap gave can be taken away and given again elsewhere without a trace, and
-the order of additions does not matter.
-Source: re-integration of submaps after loop closure as in Voxgraph and Cartographer. Departs: cells are moved as
-points, not as distances, and a cell keeps the contributions of a few submaps only, which bounds the memory by the map's
-size.
+Sums of integers are exact: what a submap added can be subtracted and added elsewhere without a trace, and the order of
+additions does not matter.
+Source: re-integration of submaps after loop closure as in Voxgraph and Cartographer. Not as there: voxels are moved as
+points, not as distances, and a voxel keeps the contributions of a few submaps only, which bounds memory by the size of
+the map.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.nodes.fusion.voxel_index import CellIndex, block_of, sum_by_key
+from placegraph.nodes.fusion.voxel_index import VoxelIndex, block_keys, sum_by_key
 from placegraph.runtime.arrays import F64, I32, I64
 
 D = TypeVar("D", bound=np.generic)
 
-MAX_SUBMAPS = 4  # departs: that one cell takes from; more views of it say nothing new
-MAX_COUNTED = 1 << 20  # where nothing is kept by submap: 32 bits hold the sums of so many points
+MAX_SUBMAPS_PER_VOXEL = 4  # chosen by hand: more views of a voxel hardly change its mean
+MAX_POINTS_PER_VOXEL = 1 << 20  # where nothing is kept by submap: 32 bits hold the sums of so many points
 
 
-class _Part:
-    """What one submap gave: by keyframe while it is open, then summed; cells as they were when they were fused."""
+class _SubmapVoxels:
+    """What one submap added, as it was when it was fused: a piece for each keyframe, joined when it is closed."""
 
     def __init__(self) -> None:
-        self.pieces: list[tuple[I64, I32]] = []
+        self.pieces: list[tuple[I64, I32]] = []  # sorted keys (N,) and sums (N, D)
         self.world_from_fused: F64 = np.eye(4)
 
     @property
     def is_moved(self) -> bool:
-        """Whether it lies elsewhere than where it was fused."""
+        """Whether the submap lies elsewhere than where it was fused."""
         return not np.array_equal(self.world_from_fused, np.eye(4))
 
-    def sums(self) -> tuple[I64, I32]:
+    def totals(self) -> tuple[I64, I32]:
         """All pieces as one: sorted keys (N,) and sums (N, D)."""
         if len(self.pieces) > 1:
             keys, values = (np.concatenate(column) for column in zip(*self.pieces, strict=True))
@@ -43,142 +43,142 @@ class _Part:
         return self.pieces[0]
 
 
-class Layer:
-    """Sums (D,) of whole numbers by cell; the last one counts, and a cell where it is 0 is not there.
+class VoxelLayer:
+    """Integer sums (D,) by voxel. The last one is a count; a voxel whose count is 0 is empty.
 
-    keep: also by submap, so that `move` is possible.
+    keep_submaps: keep the sums by submap as well, which `move_submap` needs.
     """
 
-    def __init__(self, cell_m: F64, columns: int, keep: bool) -> None:
+    def __init__(self, cell_m: F64, columns: int, keep_submaps: bool) -> None:
         self.cell_m = cell_m
-        self.keep = keep
-        self.index = CellIndex(cell_m)
+        self.keep_submaps = keep_submaps
+        self.index = VoxelIndex(cell_m)
         self.keys: I64 = np.zeros(1024, np.int64)
         self.sums: I32 = np.zeros((1024, columns), np.int32)
-        self._holders = np.zeros(1024, np.uint8)  # how many submaps a cell takes from
-        self._newest = np.full(1024, -1, np.int32)  # the last submap that was added to it
-        self._parts: dict[int, _Part] = {}
-        self._submaps_of_block: dict[int, set[int]] = {}  # which closed ones may hold cells there
-        self._gone: list[I64] = []  # cells removed, of which closed submaps do not know yet
-        self._open = -1
+        self._submap_counts = np.zeros(1024, np.uint8)  # how many submaps contribute to a voxel
+        self._latest_submap = np.full(1024, -1, np.int32)  # the last one that contributed
+        self._by_submap: dict[int, _SubmapVoxels] = {}
+        self._submaps_of_block: dict[int, set[int]] = {}  # closed submaps that may have voxels in a block
+        self._removed_keys: list[I64] = []  # removed voxels that closed submaps still hold
+        self._open_submap = -1
 
     def __len__(self) -> int:
-        return len(self.live())
+        return len(self.occupied_rows())
 
-    def live(self) -> I64:
-        """Rows of the cells that are there, oldest first."""
+    def occupied_rows(self) -> I64:
+        """Rows of the voxels that are not empty, oldest first."""
         return np.flatnonzero(self.sums[: len(self.index), -1] > 0)
 
     def add(self, keys: I64, sums: I32, submap: int) -> None:
-        """Add sums (N, D) to sorted unique cells (N,) on behalf of a submap; submaps come in order."""
+        """Add sums (N, D) to sorted unique voxels (N,) on behalf of a submap; submaps come in order."""
         rows = self._rows(keys)
-        if not self.keep:
-            taken = self.sums[rows, -1] < MAX_COUNTED
-            self._sum(rows[taken], sums[taken])
+        if not self.keep_submaps:
+            accepted = self.sums[rows, -1] < MAX_POINTS_PER_VOXEL
+            self._add_sums(rows[accepted], sums[accepted])
             return
-        if submap != self._open:
-            self.close()
-            self._open = submap
-        mine = self._newest[rows] == submap
-        taken = mine | (self._holders[rows] < MAX_SUBMAPS)
-        self._holders[rows[taken & ~mine]] += 1
-        self._newest[rows[taken]] = submap
-        if taken.any():
-            self._parts.setdefault(submap, _Part()).pieces.append((keys[taken], sums[taken]))
-        self._sum(rows[taken], sums[taken])
+        if submap != self._open_submap:
+            self.close_submap()
+            self._open_submap = submap
+        contributed = self._latest_submap[rows] == submap
+        accepted = contributed | (self._submap_counts[rows] < MAX_SUBMAPS_PER_VOXEL)
+        self._submap_counts[rows[accepted & ~contributed]] += 1
+        self._latest_submap[rows[accepted]] = submap
+        if accepted.any():
+            self._by_submap.setdefault(submap, _SubmapVoxels()).pieces.append((keys[accepted], sums[accepted]))
+        self._add_sums(rows[accepted], sums[accepted])
 
-    def close(self) -> None:
-        """Sum up what the open submap gave, and let the others know which cells have gone."""
-        closed = self._open
-        self._open = -1
-        self._drop_gone(closed)
-        if closed in self._parts:
-            self._note_blocks(closed, self._parts[closed].sums()[0])
+    def close_submap(self) -> None:
+        """Join what the open submap added, and drop removed voxels from the submaps before it."""
+        closed = self._open_submap
+        self._open_submap = -1
+        self._drop_removed(closed)
+        if closed in self._by_submap:
+            self._index_blocks(closed, self._by_submap[closed].totals()[0])
 
     def remove(self, rows: I64) -> None:
-        """Take cells out of the map, whoever gave them."""
+        """Empty voxels, whichever submaps contributed to them."""
         keys = np.sort(self.keys[rows])
-        self.sums[rows], self._holders[rows], self._newest[rows] = 0, 0, -1
-        if not self.keep or not len(rows):
+        self.sums[rows], self._submap_counts[rows], self._latest_submap[rows] = 0, 0, -1
+        if not self.keep_submaps or not len(rows):
             return
-        self._gone.append(keys)
-        if self._open in self._parts:  # what it gives to these cells from now on is new
-            part = self._parts[self._open]
-            part.pieces = [(k[kept], v[kept]) for k, v in part.pieces for kept in [~np.isin(k, keys)]]
+        self._removed_keys.append(keys)
+        if self._open_submap in self._by_submap:  # what it adds to these voxels from now on is new
+            voxels = self._by_submap[self._open_submap]
+            voxels.pieces = [(k[kept], v[kept]) for k, v in voxels.pieces for kept in [~np.isin(k, keys)]]
 
-    def move(self, submap: int, world_from_fused: F64) -> None:
-        """Take away what a submap gave and give it where it lies now, turned and shifted by a rigid (4, 4)."""
-        self.close()
-        if submap not in self._parts:
+    def move_submap(self, submap: int, world_from_fused: F64) -> None:
+        """Subtract what a submap added and add it where a rigid transform (4, 4) puts it now."""
+        self.close_submap()
+        if submap not in self._by_submap:
             return
-        part = self._parts[submap]
-        self._give(part, -1)
-        part.world_from_fused = world_from_fused
-        self._note_blocks(submap, self._give(part, 1))
+        voxels = self._by_submap[submap]
+        self._add_submap(voxels, -1)
+        voxels.world_from_fused = world_from_fused
+        self._index_blocks(submap, self._add_submap(voxels, 1))
 
-    def place(self, keys: I64, sums: I32, world_from_fused: F64) -> tuple[I64, I32]:
-        """Where fused cells (N,) lie now and what they hold there; several may lie in one. Defined by each layer."""
+    def resample(self, keys: I64, sums: I32, world_from_fused: F64) -> tuple[I64, I32]:
+        """Voxels (N,) and their sums after a rigid transform; keys may repeat. Each kind of layer defines it."""
         raise NotImplementedError
 
-    def changed(self, rows: I64) -> None:
+    def update_rows(self, rows: I64) -> None:
         """Called after the sums of these rows have changed."""
 
-    def grow(self, size: int) -> None:
-        """Make room for so many rows."""
-        for name, fill in (("keys", 0), ("sums", 0), ("_holders", 0), ("_newest", -1)):
-            setattr(self, name, grown(getattr(self, name), size, fill))
+    def reserve(self, size: int) -> None:
+        """Make room for `size` rows."""
+        for name, fill in (("keys", 0), ("sums", 0), ("_submap_counts", 0), ("_latest_submap", -1)):
+            setattr(self, name, with_capacity(getattr(self, name), size, fill))
 
-    def _placed(self, part: _Part) -> tuple[I64, I32]:
-        return self.place(*part.sums(), part.world_from_fused) if part.is_moved else part.sums()
+    def _resampled(self, voxels: _SubmapVoxels) -> tuple[I64, I32]:
+        return self.resample(*voxels.totals(), voxels.world_from_fused) if voxels.is_moved else voxels.totals()
 
-    def _give(self, part: _Part, sign: int) -> I64:
-        keys, sums = sum_by_key(*self._placed(part))
+    def _add_submap(self, voxels: _SubmapVoxels, sign: int) -> I64:
+        keys, sums = sum_by_key(*self._resampled(voxels))
         rows = self._rows(keys)
-        self._holders[rows] = np.clip(self._holders[rows].astype(int) + sign, 0, 255)
-        self._newest[rows] = -1
-        self._sum(rows, sign * sums)
+        self._submap_counts[rows] = np.clip(self._submap_counts[rows].astype(int) + sign, 0, 255)
+        self._latest_submap[rows] = -1
+        self._add_sums(rows, sign * sums)
         return keys
 
-    def _drop_gone(self, but: int) -> None:
-        if not self._gone:
+    def _drop_removed(self, except_submap: int) -> None:
+        if not self._removed_keys:
             return
-        gone = np.unique(np.concatenate(self._gone))
-        self._gone = []
-        blocks = np.unique(block_of(gone)).tolist()
-        near = set[int]().union(*(self._submaps_of_block.get(block, set()) for block in blocks))
-        for submap in sorted(near - {but}):
-            part = self._parts[submap]
-            keys, sums = part.sums()
-            kept = ~np.isin(self._placed(part)[0], gone)
-            part.pieces = [(keys[kept], sums[kept])]
+        removed = np.unique(np.concatenate(self._removed_keys))
+        self._removed_keys = []
+        blocks = np.unique(block_keys(removed)).tolist()
+        affected = set[int]().union(*(self._submaps_of_block.get(block, set()) for block in blocks))
+        for submap in sorted(affected - {except_submap}):
+            voxels = self._by_submap[submap]
+            keys, sums = voxels.totals()
+            kept = ~np.isin(self._resampled(voxels)[0], removed)
+            voxels.pieces = [(keys[kept], sums[kept])]
             if not kept.any():
-                self._forget(submap)
+                self._forget_submap(submap)
 
-    def _forget(self, submap: int) -> None:
-        del self._parts[submap]
+    def _forget_submap(self, submap: int) -> None:
+        del self._by_submap[submap]
         for submaps in self._submaps_of_block.values():
             submaps.discard(submap)
 
-    def _note_blocks(self, submap: int, keys: I64) -> None:
-        for block in np.unique(block_of(keys)).tolist():
+    def _index_blocks(self, submap: int, keys: I64) -> None:
+        for block in np.unique(block_keys(keys)).tolist():
             self._submaps_of_block.setdefault(block, set()).add(submap)
 
-    def _sum(self, rows: I32, sums: I32) -> None:
+    def _add_sums(self, rows: I32, sums: I32) -> None:
         self.sums[rows] += sums
-        self.changed(np.asarray(rows, np.int64))
+        self.update_rows(np.asarray(rows, np.int64))
 
     def _rows(self, keys: I64) -> I32:
-        known = len(self.index)
+        known_count = len(self.index)
         rows = self.index.rows(keys)
         if len(self.index) > len(self.keys):
-            self.grow(max(len(self.index), 2 * len(self.keys)))
-        new = rows >= known
+            self.reserve(max(len(self.index), 2 * len(self.keys)))
+        new = rows >= known_count
         self.keys[rows[new]] = keys[new]
         return rows
 
 
-def grown(array: NDArray[D], size: int, fill: int = 0) -> NDArray[D]:
-    """The array with more rows, filled with `fill`."""
+def with_capacity(array: NDArray[D], size: int, fill: int = 0) -> NDArray[D]:
+    """The array with more rows, the new ones filled with `fill`."""
     larger = np.full((size, *array.shape[1:]), fill, array.dtype)
     larger[: len(array)] = array
     return larger

@@ -11,7 +11,7 @@ from placegraph.nodes.hierarchy.floors import FloorConfig
 from placegraph.nodes.hierarchy.graph_builder import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
 from placegraph.nodes.hierarchy.rooms import RoomConfig
-from placegraph.nodes.hierarchy.traversability import TravelConfig
+from placegraph.nodes.hierarchy.traversability import TraversabilityConfig
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Graph, Map, Message, PlaceNames
 from placegraph.runtime.node import Context, Node, NodeConfig
@@ -24,7 +24,7 @@ class HierarchyConfig(NodeConfig):
     floors: FloorConfig = FloorConfig()
     rooms: RoomConfig = RoomConfig()
     locations: LocationConfig = LocationConfig()
-    travel: TravelConfig = TravelConfig()
+    traversability: TraversabilityConfig = TraversabilityConfig()
 
 
 class HierarchyNode(Node):

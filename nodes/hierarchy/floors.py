@@ -1,10 +1,10 @@
 """Floors from the heights of horizontal layers and the camera's path.
 
 Source: paper, floor layer (height histogram, peaks, DBSCAN, the two strongest of each cluster, pairs).
-Departs: a layer weighs by the plan area it covers, so that walls and dense scans of one corner do not drown a floor;
-weak layers are kept, since h > .9 h_max loses floors of partial scans; of each pair the camera's path decides what is
-a floor (someone stood above it) and what a ceiling; there is always a floor where there are points. Levels less than
-`storey_m` above a floor (steps, landings, split levels) belong to it.
+Not as in the paper: a layer weighs by the plan area it covers, so that walls and dense scans of one corner do not hide
+a floor; weak layers are kept, since h > .9 h_max loses floors of partial scans; the camera's path decides which layer
+of a pair is a floor (someone stood above it) and which a ceiling; where there are points there is a floor. Levels less
+than `storey_m` above a floor (steps, landings, split levels) belong to it.
 """
 
 from __future__ import annotations
@@ -20,44 +20,45 @@ from placegraph.runtime.arrays import F64, I64, Points
 
 
 class FloorConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """Parameters of the floor layer."""
+    """Parameters of the floor layer. Values without a source were chosen by hand."""
 
     bin_m: float = 0.01  # paper, floor layer
-    smooth_m: float = 0.02  # departs: depth noise spreads a floor over some bins
+    smooth_m: float = 0.02  # depth noise spreads a floor over some bins
     separation_m: float = 0.2  # paper, delta_f
-    keep_share: float = 0.2  # departs: paper .9 (p_h); a user of HOV-SG needed .2 on partial scans
+    keep_share: float = 0.2  # paper .9 (p_h); a user of HOV-SG needed .2 on partial scans
     slab_m: float = 0.6  # DBSCAN eps: ceiling and next floor are one cluster, floor and table (.7) are not
     cell_m: float = 0.1  # plan cells that make up a layer's area
-    rise_share: float = 0.3  # departs: of a layer's area, what it has more than the heights around it: walls have peaks
-    storey_m: float = 2.0  # least height from a floor to its ceiling or the next floor
-    # departs: of a floor whose ceiling is not in view, as a camera held level at 1.4 m sees it from 5 m on only
-    ceiling_m: float = 2.5
+    rise_share: float = 0.3  # of a layer's area, its prominence over the heights around it: walls have small peaks
+    storey_m: float = 2.0  # minimum height from a floor to its ceiling or the next floor
+    ceiling_m: float = 2.5  # assumed where no ceiling is in view: a level camera at 1.4 m sees it from 5 m on only
     camera_min_m: float = 0.15  # a robot's sensor, or a person's hand, above its floor
     camera_max_m: float = 2.2
-    below_share: float = 0.1  # of the seen plan area; more than this well below a layer says that it is no floor
-    upper_share: float = 0.25  # of a slab's stronger layer, for its upper one to be a floor and not beds on that floor
-    stood_share: float = 0.1  # of the path above the floors below, for a layer to carry it
-    camera_share: float = 0.05  # of the path must be too high for the floors below before another is looked for
+    below_share: float = 0.1  # of the seen plan area; a layer with more than this well below it is no floor
+    upper_share: float = 0.25  # of a slab's stronger layer, that its upper one has if it is a floor and not beds
+    stood_share: float = 0.1  # of the path above the floors below, that stands on a layer if it is a floor
+    camera_share: float = 0.05  # of the path, that must be too high for the floors below before another is sought
 
 
 @dataclass(frozen=True)
 class FloorSpan:
-    """Heights in metres, world frame: of the floor, of its ceiling (or the highest point), and where its zone ends."""
+    """Heights in metres, world frame: of a floor, of its ceiling or highest point, and of the zone of its points."""
 
     low: float
     high: float
-    zone_low: float  # points from here
-    zone_high: float  # to here are this floor's
-    expected: float = -np.inf  # of a ceiling that was not seen
+    zone_low: float
+    zone_high: float
+    expected_ceiling: float = -np.inf  # of a ceiling that was not seen
 
     @property
     def ceiling(self) -> float:
-        """Where the floor ends: at its ceiling, or where one is expected, or above that at the highest point."""
-        return max(self.high, self.expected)
+        """The seen ceiling, or the expected one, or the highest point above that."""
+        return max(self.high, self.expected_ceiling)
 
 
 @dataclass(frozen=True)
 class _Layer:
+    """A horizontal layer of the cloud: height (m, world) and covered plan area (m2)."""
+
     height: float
     area: float
 
@@ -66,7 +67,7 @@ def find_floors(points_world: Points, camera_positions_world: Points, config: Fl
     """Floors from the lowest up; none only where there are no points.
 
     points_world: (P, 3) one point per voxel of the map; camera_positions_world: (K, 3); metres, world frame.
-    Source: paper, section "Floor Layer"; departures at the head of this file.
+    Source: paper, section "Floor Layer"; differences at the head of this file.
     """
     if not len(points_world):
         return []
@@ -74,12 +75,12 @@ def find_floors(points_world: Points, camera_positions_world: Points, config: Fl
     plan, cells = _plan_cells(points_world, config)
     slabs = _slabs(_layers(z, plan, cells, config), config)
     cameras = np.sort(np.asarray(camera_positions_world[:, 2], float))
-    lows = [_ground(z, plan, cells, slabs, cameras, config)]
+    lows = [_lowest_floor(z, plan, cells, slabs, cameras, config)]
     while True:
-        standing = cameras[cameras > lows[-1] + config.camera_max_m]
-        if len(standing) < max(1, config.camera_share * len(cameras)):
+        above = cameras[cameras > lows[-1] + config.camera_max_m]
+        if len(above) < max(1, config.camera_share * len(cameras)):
             break
-        upper = _floor_above(slabs, lows[-1] + config.storey_m, standing, config)
+        upper = _floor_above(slabs, lows[-1] + config.storey_m, above, config)
         if upper is None:
             break
         lows.append(upper)
@@ -96,11 +97,11 @@ def _layers(z: F64, plan: I64, cells: int, config: FloorConfig) -> list[_Layer]:
     area = gaussian_filter1d(area.astype(float), config.smooth_m / config.bin_m, mode="constant")
     distance = max(1, round(config.separation_m / config.bin_m))
     # padded: a peak at either end is one too
-    peaks, found = find_peaks(np.r_[0.0, area, 0.0], distance=distance, prominence=0.0)
+    peaks, properties = find_peaks(np.r_[0.0, area, 0.0], distance=distance, prominence=0.0)
     if not len(peaks):
         return []
-    covered = area[peaks - 1]
-    strong = (covered > config.keep_share * covered.max()) & (found["prominences"] >= config.rise_share * covered)
+    areas = area[peaks - 1]
+    strong = (areas > config.keep_share * areas.max()) & (properties["prominences"] >= config.rise_share * areas)
     return [_Layer((p + bottom - 0.5) * config.bin_m, float(area[p - 1])) for p in peaks[strong]]
 
 
@@ -114,7 +115,7 @@ def _plan_cells(points: Points, config: FloorConfig) -> tuple[I64, int]:
 
 
 def _slabs(layers: list[_Layer], config: FloorConfig) -> list[list[_Layer]]:
-    """Layers in clusters. In one dimension, with every point a core point, DBSCAN is a cut at each gap over eps."""
+    """Clusters of layers. In one dimension, with all points core points, DBSCAN is a cut at each gap over eps."""
     slabs: list[list[_Layer]] = []
     for layer in layers:
         if slabs and layer.height - slabs[-1][-1].height <= config.slab_m:
@@ -124,12 +125,13 @@ def _slabs(layers: list[_Layer], config: FloorConfig) -> list[list[_Layer]]:
     return slabs
 
 
-def _below(layer: _Layer, cameras: F64, config: FloorConfig) -> int:
+def _count_standing(layer: _Layer, cameras: F64, config: FloorConfig) -> int:
+    """How many cameras (heights) may stand on a layer."""
     over = cameras - layer.height
     return int(((over > config.camera_min_m) & (over < config.camera_max_m)).sum())
 
 
-def _ground(z: F64, plan: I64, cells: int, slabs: list[list[_Layer]], cameras: F64, config: FloorConfig) -> float:
+def _lowest_floor(z: F64, plan: I64, cells: int, slabs: list[list[_Layer]], cameras: F64, config: FloorConfig) -> float:
     """The lowest layer that someone stood above and that has next to nothing beneath it."""
     lowest = np.full(cells, np.inf)
     np.minimum.at(lowest, plan, z)
@@ -138,37 +140,37 @@ def _ground(z: F64, plan: I64, cells: int, slabs: list[list[_Layer]], cameras: F
         beneath = np.count_nonzero(lowest < layer.height - config.separation_m)
         if beneath > config.below_share * seen:
             break
-        if _below(layer, cameras, config) or not len(cameras):
+        if _count_standing(layer, cameras, config) or not len(cameras):
             return layer.height
     return float(np.percentile(z, 0.5))  # provisional: no floor in view yet
 
 
-def _floor_above(slabs: list[list[_Layer]], least: float, standing: F64, config: FloorConfig) -> float | None:
-    """The next floor at or above `least`: of a slab's two strongest layers the upper, if it may be a floor at all."""
+def _floor_above(slabs: list[list[_Layer]], min_m: float, cameras: F64, config: FloorConfig) -> float | None:
+    """The next floor at or above `min_m`: the upper of a slab's two strongest layers, if it may be a floor at all."""
     for slab in slabs:
         pair = sorted(sorted(slab, key=lambda layer: -layer.area)[:2], key=lambda layer: -layer.height)
         for layer in pair:
-            comparable = layer.area >= config.upper_share * max(other.area for other in pair)
-            stood_on = _below(layer, standing, config) >= config.stood_share * len(standing)
-            if layer.height >= least and comparable and stood_on:
+            comparable = layer.area >= config.upper_share * max(peer.area for peer in pair)
+            stood_on = _count_standing(layer, cameras, config) >= config.stood_share * len(cameras)
+            if layer.height >= min_m and comparable and stood_on:
                 return layer.height
     return None
 
 
 def _spans(lows: list[float], slabs: list[list[_Layer]], z: F64, config: FloorConfig) -> list[FloorSpan]:
     layers = [layer for slab in slabs for layer in slab]
-    margin = config.separation_m / 2  # noise below a floor is that floor's
+    margin = config.separation_m / 2  # so far below a floor lies its own noise
     top, z_min, z_max = float(np.percentile(z, 99.5)), float(z.min()), float(z.max())
     spans = []
     for i, low in enumerate(lows):
         last = i + 1 == len(lows)
         limit = top + margin if last else lows[i + 1] - margin
         above = [layer for layer in layers if low + config.storey_m <= layer.height <= limit]
-        # nothing at storey height or more: what was seen ends the floor, of a lower one but for the walls of its stairs
+        # without a layer at storey height the points end the floor; of a lower one without the walls of its stairs
         between = z[(z >= low) & (z <= limit)]
         seen = top if last else float(np.percentile(between, 98)) if len(between) else low
         high = max(above, key=lambda layer: layer.area).height if above else min(seen, limit)
         zone = (z_min if i == 0 else low - margin, z_max if last else limit)
-        expected = -np.inf if above else min(low + config.ceiling_m, limit if not last else np.inf)
-        spans.append(FloorSpan(low, max(high, low), *zone, expected))
+        expected_ceiling = -np.inf if above else min(low + config.ceiling_m, limit if not last else np.inf)
+        spans.append(FloorSpan(low, max(high, low), *zone, expected_ceiling))
     return spans

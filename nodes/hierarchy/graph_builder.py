@@ -10,15 +10,16 @@ import numpy as np
 from pydantic import BaseModel
 
 from placegraph.models_onnx import LocationDetector
-from placegraph.nodes.hierarchy.approach_poses import Target
+from placegraph.nodes.hierarchy.approach_poses import ApproachTarget
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floors
 from placegraph.nodes.hierarchy.locations import LocationArea, LocationConfig, find_locations
-from placegraph.nodes.hierarchy.memo import Unchanged, digest
-from placegraph.nodes.hierarchy.object_rooms import HomeRoom, find_homes
-from placegraph.nodes.hierarchy.persistent_ids import Identities, Place, span_footprint
+from placegraph.nodes.hierarchy.memo import Memo, digest
+from placegraph.nodes.hierarchy.object_rooms import FloorRoom, assign_rooms
+from placegraph.nodes.hierarchy.persistent_ids import PersistentIds, PlaceFootprint, height_footprint
 from placegraph.nodes.hierarchy.place_graph_builder import FloorPlan, PlacedObject, PlaceGraph, PlaceGraphBuilder
-from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, find_rooms
-from placegraph.nodes.hierarchy.traversability import TravelConfig
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.rooms import RoomArea, RoomConfig, find_rooms
+from placegraph.nodes.hierarchy.traversability import TraversabilityConfig
 from placegraph.runtime.arrays import F32, F64, Points
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Map
@@ -32,11 +33,11 @@ class LayerConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     floors: FloorConfig = FloorConfig()
     rooms: RoomConfig = RoomConfig()
     locations: LocationConfig = LocationConfig()
-    travel: TravelConfig = TravelConfig()
+    traversability: TraversabilityConfig = TraversabilityConfig()
 
 
 @dataclass(frozen=True, eq=False)
-class _Extent:
+class _FloorExtent:
     """Of all points of a floor: box (2, 3) and convex outline (K, 2), metres, world."""
 
     box: F64
@@ -49,119 +50,120 @@ class GraphBuilder:
     def __init__(self, config: LayerConfig, detector: LocationDetector | None = None) -> None:
         """`detector` is the network that config.locations.model names; None where it names none."""
         self._config, self._detector = config, detector
-        self._floors, self._rooms, self._locations = Identities("F"), Identities("R"), Identities("L")
-        self._places = PlaceGraphBuilder(config.travel, config.floors, config.rooms)
-        self._known_rooms: Unchanged[tuple[Grid, list[RoomArea], _Extent]] = Unchanged()
-        self._known_locations: Unchanged[list[LocationArea]] = Unchanged()
-        self._known_footprints: Unchanged[F32] = Unchanged()
+        self._floor_ids, self._room_ids, self._location_ids = (PersistentIds(letter) for letter in "FRL")
+        self._places = PlaceGraphBuilder(config.traversability, config.floors, config.rooms)
+        self._room_memo: Memo[tuple[PlanGrid, list[RoomArea], _FloorExtent]] = Memo()
+        self._location_memo: Memo[list[LocationArea]] = Memo()
+        self._footprint_memo: Memo[F32] = Memo()
 
-    def build(self, world: Map) -> SceneGraph:
+    def build(self, map_: Map) -> SceneGraph:
         """The graph of a Map; rooms and locations are without names. Deterministic in the sequence of maps.
 
         Raises SchemaError for points that are not finite and objects without points.
         """
-        _check(world)
-        objects = np.split(world.object_points_world, world.object_point_offsets[1:-1]) if len(world.object_ids) else []
-        spans = find_floors(world.points_world, world.camera_positions_world, self._config.floors)
+        _check(map_)
+        objects = np.split(map_.object_points_world, map_.object_point_offsets[1:-1]) if len(map_.object_ids) else []
+        spans = find_floors(map_.points_world, map_.camera_positions_world, self._config.floors)
         if not spans and objects:  # objects without a cloud: the floor is what they stand on
-            spans = find_floors(world.object_points_world, world.camera_positions_world, self._config.floors)
-        points = world.points_world if len(world.points_world) else world.object_points_world
-        floor_ids = self._floors.assign([Place(span_footprint(s.low, max(s.ceiling, s.low + 0.1))) for s in spans])
+            spans = find_floors(map_.object_points_world, map_.camera_positions_world, self._config.floors)
+        points = map_.points_world if len(map_.points_world) else map_.object_points_world
+        floor_ids = self._floor_ids.assign(
+            [PlaceFootprint(height_footprint(span.low, max(span.ceiling, span.low + 0.1))) for span in spans]
+        )
         nodes: list[Node] = []
-        rooms: list[HomeRoom] = []
-        extents: list[_Extent] = []
+        rooms: list[FloorRoom] = []
+        extents: list[_FloorExtent] = []
         for i, (span, floor_id) in enumerate(zip(spans, floor_ids, strict=True)):
-            inside, free = _in_zone(points, span), _in_zone(world.free_points_world, span)
-            grid, areas, extent = self._find_rooms(inside, free, world.free_cell_m, span)
+            floor_points, free = _in_zone(points, span), _in_zone(map_.free_points_world, span)
+            grid, areas, extent = self._find_rooms(floor_points, free, map_.free_cell_m, span)
             extents.append(extent)
-            ids = self._rooms.assign([Place(area.outline, floor_id) for area in areas])
-            nodes.append(_place(floor_id, "B0", span, extent.outline, (Tag(f"floor {i + 1}", 1.0),)))
-            rooms += [HomeRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
-        nodes += [_place(room.id, room.floor, room.span, room.area.outline) for room in rooms]
-        home = find_homes(objects, rooms)
-        nodes += self._fill(rooms, home, objects, world)
-        for known in (self._known_rooms, self._known_locations, self._known_footprints):
-            known.turn()
-        nodes = _with_frames([_building(extents), *nodes])
-        placed = _placed(nodes, {f"O{number}": room.id for number, room in zip(world.object_ids, home, strict=True)})
-        places = self._connect(world, list(zip(spans, floor_ids, strict=True)), rooms, placed)
+            ids = self._room_ids.assign([PlaceFootprint(area.outline, floor_id) for area in areas])
+            nodes.append(_place_node(floor_id, "B0", span, extent.outline, (Tag(f"floor {i + 1}", 1.0),)))
+            rooms += [FloorRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
+        nodes += [_place_node(room.id, room.floor_id, room.span, room.area.outline) for room in rooms]
+        object_rooms = assign_rooms(objects, rooms)
+        nodes += self._location_and_object_nodes(rooms, object_rooms, objects, map_)
+        for memo in (self._room_memo, self._location_memo, self._footprint_memo):
+            memo.end_build()
+        nodes = _with_frames([_building_node(extents), *nodes])
+        room_ids = {f"O{number}": room.id for number, room in zip(map_.object_ids, object_rooms, strict=True)}
+        placed = [
+            PlacedObject(node.id, room_ids[node.id], ApproachTarget(node.footprint, node.center))
+            for node in nodes
+            if node.id in room_ids
+        ]
+        places = self._place_graph(map_, list(zip(spans, floor_ids, strict=True)), rooms, placed)
         nodes = [replace(node, approach=places.approaches.get(node.id)) for node in nodes]
-        return SceneGraph.of(nodes, places.connections, places.ways)
+        return SceneGraph.of(nodes, places.connections, places.route_segments)
 
-    def _connect(
-        self, world: Map, floors: list[tuple[FloorSpan, str]], rooms: list[HomeRoom], objects: list[PlacedObject]
+    def _place_graph(
+        self, map_: Map, floors: list[tuple[FloorSpan, str]], rooms: list[FloorRoom], objects: list[PlacedObject]
     ) -> PlaceGraph:
-        points = world.points_world if len(world.points_world) else world.object_points_world
+        points = map_.points_world if len(map_.points_world) else map_.object_points_world
         plans = []
         for span, floor_id in floors:
-            here = [room for room in rooms if room.floor == floor_id]
-            if not here:
+            floor_rooms = [room for room in rooms if room.floor_id == floor_id]
+            if not floor_rooms:
                 continue
-            inside, free = _in_zone(points, span), _in_zone(world.free_points_world, span)
-            masks = tuple((room.id, room.area.mask) for room in here)
-            plans.append(FloorPlan(floor_id, span, here[0].grid, inside, free, masks))
-        return self._places.build(world, plans, objects)
+            floor_points, free = _in_zone(points, span), _in_zone(map_.free_points_world, span)
+            masks = tuple((room.id, room.area.mask) for room in floor_rooms)
+            plans.append(FloorPlan(floor_id, span, floor_rooms[0].grid, floor_points, free, masks))
+        return self._places.build(map_, plans, objects)
 
     def _find_rooms(
         self, points: Points, free: Points, free_cell_m: float, span: FloorSpan
-    ) -> tuple[Grid, list[RoomArea], _Extent]:
-        """Rooms of a floor and its own outline, made again only when its points, free space or heights changed."""
+    ) -> tuple[PlanGrid, list[RoomArea], _FloorExtent]:
+        """Rooms of a floor and its own outline, found again only when its points, free space or heights changed."""
 
-        def make() -> tuple[Grid, list[RoomArea], _Extent]:
-            extent = _Extent(np.asarray(bounding_box(points), float), np.asarray(convex_footprint(points), float))
+        def compute() -> tuple[PlanGrid, list[RoomArea], _FloorExtent]:
+            extent = _FloorExtent(np.asarray(bounding_box(points), float), np.asarray(convex_footprint(points), float))
             return *find_rooms(points, free, free_cell_m, span, self._config.rooms), extent
 
-        return self._known_rooms.get(digest(points, free, free_cell_m, span.low, span.high), make)
+        return self._room_memo.get(digest(points, free, free_cell_m, span.low, span.high), compute)
 
-    def _fill(self, rooms: list[HomeRoom], home: list[HomeRoom], objects: list[Points], world: Map) -> list[Node]:
-        """Locations of all rooms, then the objects in them; a room's are found again only when its objects changed."""
+    def _location_and_object_nodes(
+        self, rooms: list[FloorRoom], object_rooms: list[FloorRoom], objects: list[Points], map_: Map
+    ) -> list[Node]:
+        """Locations of all rooms, then all objects; a room's are found again only when its objects changed."""
         digests = [digest(xyz) for xyz in objects]
-        members: dict[str, list[int]] = {room.id: [] for room in rooms}
-        for i, room in enumerate(home):
-            members[room.id].append(i)
-        found = [(room, area) for room in rooms for area in self._find_locations(room, members, objects, digests)]
+        in_room: dict[str, list[int]] = {room.id: [] for room in rooms}
+        for i, room in enumerate(object_rooms):
+            in_room[room.id].append(i)
+        areas = [
+            (room, area) for room in rooms for area in self._find_locations(room, in_room[room.id], objects, digests)
+        ]
         # all of them at once: an id goes to one place, also when a room is split
-        ids = self._locations.assign([Place(area.outline, room.floor) for room, area in found])
-        parent = [room.id for room in home]
+        ids = self._location_ids.assign([PlaceFootprint(area.outline, room.floor_id) for room, area in areas])
+        parents = [room.id for room in object_rooms]
         nodes = []
-        for location_id, (room, area) in zip(ids, found, strict=True):
-            held = [members[room.id][k] for k in area.members]
-            for i in held:
-                parent[i] = location_id
-            box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
+        for location_id, (room, area) in zip(ids, areas, strict=True):
+            members = [in_room[room.id][k] for k in area.members]
+            for i in members:
+                parents[i] = location_id
+            box = bounding_box(map_.object_boxes_world[members].reshape(-1, 3))
             nodes.append(_node(location_id, room.id, box, area.outline))
         for i, key in enumerate(digests):
-            footprint = self._known_footprints.get(key, partial(convex_footprint, objects[i]))
-            nodes.append(_object(i, parent[i], footprint, world))
+            footprint = self._footprint_memo.get(key, partial(convex_footprint, objects[i]))
+            nodes.append(_object_node(i, parents[i], footprint, map_))
         return nodes
 
     def _find_locations(
-        self, room: HomeRoom, members: dict[str, list[int]], objects: list[Points], digests: list[bytes]
+        self, room: FloorRoom, members: list[int], objects: list[Points], digests: list[bytes]
     ) -> list[LocationArea]:
-        mine = members[room.id]
-        key = digest(room.span.low, room.span.ceiling, *(digests[i] for i in mine))
-        return self._known_locations.get(
-            key,
-            lambda: find_locations([objects[i] for i in mine], room.span, self._config.locations, self._detector),
+        return self._location_memo.get(
+            digest(room.span.low, room.span.ceiling, *(digests[i] for i in members)),
+            lambda: find_locations([objects[i] for i in members], room.span, self._config.locations, self._detector),
         )
 
 
-def _placed(nodes: list[Node], room_of: dict[str, str]) -> list[PlacedObject]:
-    return [
-        PlacedObject(node.id, room_of[node.id], Target(node.footprint, node.center))
-        for node in nodes
-        if node.id in room_of
-    ]
-
-
-def _check(world: Map) -> None:
+def _check(map_: Map) -> None:
     for name in ("points_world", "free_points_world", "camera_positions_world", "object_points_world"):
-        bad = np.flatnonzero(~np.isfinite(getattr(world, name)).all(axis=1))
+        bad = np.flatnonzero(~np.isfinite(getattr(map_, name)).all(axis=1))
         if len(bad):
-            raise SchemaError(f"Map {world.revision}: {name}[{bad[0]}] is not finite")
-    empty = np.flatnonzero(np.diff(world.object_point_offsets) <= 0)
+            raise SchemaError(f"Map {map_.revision}: {name}[{bad[0]}] is not finite")
+    empty = np.flatnonzero(np.diff(map_.object_point_offsets) <= 0)
     if len(empty):
-        raise SchemaError(f"Map {world.revision}: object {world.object_ids[empty[0]]} has no points")
+        raise SchemaError(f"Map {map_.revision}: object {map_.object_ids[empty[0]]} has no points")
 
 
 def _in_zone(xyz: Points, span: FloorSpan) -> Points:
@@ -169,32 +171,33 @@ def _in_zone(xyz: Points, span: FloorSpan) -> Points:
     return xyz[(z >= span.zone_low) & (z <= span.zone_high)]
 
 
-def _building(floors: list[_Extent]) -> Node:
+def _building_node(floors: list[_FloorExtent]) -> Node:
     if not floors:
         return _node("B0", "", np.zeros((2, 3)), np.zeros((0, 2)))
-    box = np.array([np.min([one.box[0] for one in floors], axis=0), np.max([one.box[1] for one in floors], axis=0)])
-    return _node("B0", "", box, convex_footprint(np.concatenate([one.outline for one in floors])))
+    boxes = np.stack([floor.box for floor in floors])
+    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    return _node("B0", "", box, convex_footprint(np.concatenate([floor.outline for floor in floors])))
 
 
-def _place(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tuple[Tag, ...] = ()) -> Node:
+def _place_node(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tuple[Tag, ...] = ()) -> Node:
     box = np.array([[*outline.min(axis=0), span.low], [*outline.max(axis=0), span.ceiling]])
     return _node(node_id, parent, box, outline, tags=tags)
 
 
-def _object(i: int, parent: str, footprint: Points, world: Map) -> Node:
-    votes = slice(int(world.tag_offsets[i]), int(world.tag_offsets[i + 1]))
-    names, weights = world.tag_names[votes], world.tag_votes[votes].tolist()
+def _object_node(i: int, parent: str, footprint: Points, map_: Map) -> Node:
+    votes = slice(int(map_.tag_offsets[i]), int(map_.tag_offsets[i + 1]))
+    names, weights = map_.tag_names[votes], map_.tag_votes[votes].tolist()
     return _node(
-        f"O{int(world.object_ids[i])}",
+        f"O{int(map_.object_ids[i])}",
         parent,
-        world.object_boxes_world[i],
+        map_.object_boxes_world[i],
         footprint,
         tags=tuple(Tag(name, weight) for name, weight in zip(names, weights, strict=True)),
-        first_frame=int(world.object_first_frames[i]),
-        last_frame=int(world.object_last_frames[i]),
-        observations=int(world.object_observations[i]),
-        oriented_box=tuple(world.object_oriented_boxes[i].tolist()),
-        color=tuple(world.object_colors[i].tolist()),
+        first_frame=int(map_.object_first_frames[i]),
+        last_frame=int(map_.object_last_frames[i]),
+        observations=int(map_.object_observations[i]),
+        oriented_box=tuple(map_.object_oriented_boxes[i].tolist()),
+        color=tuple(map_.object_colors[i].tolist()),
     )
 
 
@@ -208,15 +211,11 @@ def _with_frames(nodes: list[Node]) -> list[Node]:
     parents = {node.id: node.parent for node in nodes}
     frames: dict[str, list[int]] = {}
     for node in nodes:
-        at = node.parent if node.layer == "object" else ""
-        while at:
-            frames.setdefault(at, []).extend((node.first_frame, node.last_frame))
-            at = parents[at]
+        ancestor = node.parent if node.layer == "object" else ""
+        while ancestor:
+            frames.setdefault(ancestor, []).extend((node.first_frame, node.last_frame))
+            ancestor = parents[ancestor]
     return [
-        _node(
-            n.id, n.parent, n.box, n.footprint, tags=n.tags, first_frame=min(frames[n.id]), last_frame=max(frames[n.id])
-        )
-        if n.id in frames
-        else n
-        for n in nodes
+        replace(node, first_frame=min(frames[node.id]), last_frame=max(frames[node.id])) if node.id in frames else node
+        for node in nodes
     ]

@@ -1,11 +1,13 @@
 """Locations: groups of objects that stand close together in one room.
 
-Source: paper, location layer, by the recipe that made its training labels: DBSCAN on a height band, each object joins
-the cluster with most of its points, clusters with few objects go, project, outline, drop small and elongated polygons.
-Departs: DBSCAN runs on coarse cells of the objects' points, room by room; the outline is that of the closed bird's-eye
-mask, which like an alpha shape may be concave. With a `model` its masks decide instead, as in the paper: the objects
-inside a mask are its members. Departs: mostly inside, since masks are coarse; the outline is the convex one of the mask
-and of the members that stand on the floor, since a mask also covers what belongs there and was not mapped.
+With a `model`, its masks on a bird's-eye image decide, as in the paper: the objects inside a mask are its members. Not
+as in the paper: mostly inside suffices, since masks are coarse; the outline is the convex hull of the mask and of the
+members that stand on the floor, since a mask also covers what belongs there and was not mapped.
+
+Without one, objects are clustered as for the paper's training labels: DBSCAN on a height band, each object joins the
+cluster with most of its points, clusters with few objects are dropped, then small and elongated outlines. Not as in the
+paper: DBSCAN runs on coarse cells of the objects' points, room by room, and the outline is that of the closed
+bird's-eye mask, which like an alpha shape may be concave.
 """
 
 from __future__ import annotations
@@ -21,35 +23,35 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from placegraph.models_onnx import LocationDetector
-from placegraph.nodes.hierarchy.birds_eye_view import bird_eye
+from placegraph.nodes.hierarchy.birds_eye_view import birds_eye_image
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.rooms import floor_grid
+from placegraph.nodes.hierarchy.plan_grid import floor_grid
 from placegraph.runtime.arrays import F64, I64, Points
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.vision.geometry import convex_footprint
 
 
 class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """Parameters of the location layer."""
+    """Parameters of the location layer. Where the paper states no value it was chosen by hand."""
 
-    band_low: float = 0.05  # paper, alpha_min (value not stated): above the noise of the floor
-    band_high: float = 0.8  # paper, alpha_max (value not stated): below lamps
-    cell_m: float = 0.1  # departs: points are thinned to cells of this size before they are clustered
-    eps_m: float = 0.4  # paper, DBSCAN (value not stated): a chair pulled out from its table
-    min_cells: int = 4  # paper, DBSCAN (value not stated)
-    min_objects: int = 2  # paper, c (value not stated)
-    min_area_m2: float = 0.25  # paper (value not stated)
-    compactness: float = 0.25  # paper, C in 4 pi S / P^2 < C (value not stated); a 5:1 strip has .44
-    close_m: float = 0.2  # departs: stands for the alpha of the alpha shape
-    model: str = ""  # a LocationDetector of the manifest; "": the recipe above
-    min_score: float = Field(default=0.3, ge=0, le=1)  # of the model's masks; from maps of three houses
+    band_low: float = 0.05  # paper, alpha_min: above the noise of the floor
+    band_high: float = 0.8  # paper, alpha_max: below lamps
+    cell_m: float = 0.1  # points are thinned to cells of this size before they are clustered
+    eps_m: float = 0.4  # paper, DBSCAN: a chair pulled out from its table
+    min_cells: int = 4  # paper, DBSCAN
+    min_objects: int = 2  # paper, c
+    min_area_m2: float = 0.25  # paper
+    compactness: float = 0.25  # paper, C in 4 pi S / P^2 < C; a 5:1 strip has .44
+    close_m: float = 0.2  # in place of the alpha of the alpha shape
+    model: str = ""  # a LocationDetector of the manifest; "": objects are clustered
+    min_score: float = Field(default=0.3, ge=0, le=1)  # of the model's masks; chosen on maps of three houses
     inside_share: float = Field(default=0.5, gt=0, le=1)  # of an object's points in a mask that make it a member
-    stand_m: float = 0.4  # an object that begins higher hangs or lies on another: it draws no outline
+    stand_m: float = 0.4  # an object that begins higher hangs or lies on another and adds nothing to an outline
 
 
 @dataclass(frozen=True, eq=False)
 class LocationArea:
-    """One location: outline (K, 2) in metres, world frame, and the positions of its objects in the list given."""
+    """One location: outline (K, 2) in metres, world frame, and the indices of its objects in the given list."""
 
     outline: F64
     members: tuple[int, ...]
@@ -68,42 +70,42 @@ def find_locations(
         ModelError: the network cannot be run.
     """
     if detector is not None:
-        return _detect(objects, span, config, detector)
+        return _find_by_network(objects, span, config, detector)
     if config.model:
         raise ConfigError(f"locations: model {config.model!r} is named, but no network was loaded")
-    return _recipe(objects, span, config)
+    return _find_by_clustering(objects, span, config)
 
 
-def _detect(
+def _find_by_network(
     objects: Sequence[Points], span: FloorSpan, config: LocationConfig, detector: LocationDetector
 ) -> list[LocationArea]:
-    """Masks of the network, best first: each takes the objects mostly inside it that no better one has."""
-    image, grid = bird_eye(objects, span, config.band_high)
+    """Each mask of the network, best first, takes the objects mostly inside it that no better one has taken."""
+    image, grid = birds_eye_image(objects, span, config.band_high)
     if not image.any():
         return []
-    found = detector.locate(image)
+    detected = detector.locate(image)
     top = span.low + config.band_high * (span.ceiling - span.low)
     banded = [xyz[xyz[:, 2] <= top] for xyz in objects]
     free = {i for i, xyz in enumerate(banded) if len(xyz)}
     areas = []
-    for mask, score in zip(found.masks, found.scores.tolist(), strict=True):
+    for mask, score in zip(detected.masks, detected.scores.tolist(), strict=True):
         inside = [i for i in sorted(free) if mask[grid.cells(banded[i])].mean() >= config.inside_share]
         if score < config.min_score or not inside:
             continue
-        outline = _around(grid.outline(mask), [banded[i] for i in inside], span, config)
+        outline = _outline_with_members(grid.outline(mask), [banded[i] for i in inside], span, config)
         if cv2.contourArea(outline.astype(np.float32)) >= config.min_area_m2:
             free -= set(inside)
             areas.append(LocationArea(outline, tuple(inside)))
     return sorted(areas, key=lambda area: area.members[0])
 
 
-def _around(mask_outline: F64, members: list[Points], span: FloorSpan, config: LocationConfig) -> F64:
-    """Convex outline (K, 2) of a mask's and of those members that stand on the floor."""
+def _outline_with_members(mask_outline: F64, members: list[Points], span: FloorSpan, config: LocationConfig) -> F64:
+    """Convex outline (K, 2) of a mask's outline and of the members that stand on the floor."""
     standing = [xyz[:, :2] for xyz in members if xyz[:, 2].min() <= span.low + config.stand_m]
     return np.asarray(convex_footprint(np.concatenate([mask_outline, *standing])), float)
 
 
-def _recipe(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:
+def _find_by_clustering(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:
     height = span.ceiling - span.low
     low, high = span.low + config.band_low * height, span.low + config.band_high * height
     banded = [xyz[(xyz[:, 2] >= low) & (xyz[:, 2] <= high)] for xyz in objects]
@@ -129,8 +131,10 @@ def _cluster(points: Points, config: LocationConfig) -> I64:
     cells, cell_of = np.unique(np.floor(points / config.cell_m).astype(np.int64), axis=0, return_inverse=True)
     pairs = cKDTree(cells).query_pairs(config.eps_m / config.cell_m, output_type="ndarray")
     core = 1 + np.bincount(pairs.ravel(), minlength=len(cells)) >= config.min_cells
-    both = pairs[core[pairs].all(axis=1)]
-    links = coo_matrix((np.ones(len(both), bool), (both[:, 0], both[:, 1])), shape=(len(cells), len(cells)))
+    core_pairs = pairs[core[pairs].all(axis=1)]
+    links = coo_matrix(
+        (np.ones(len(core_pairs), bool), (core_pairs[:, 0], core_pairs[:, 1])), shape=(len(cells), len(cells))
+    )
     _, labels = connected_components(links, directed=False)
     labels = np.where(core, labels, -1).astype(np.int64)
     for a, b in pairs[core[pairs].sum(axis=1) == 1].tolist():  # border cells join the core cell beside them

@@ -8,44 +8,46 @@ from dataclasses import dataclass
 import numpy as np
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.rooms import Grid, RoomArea
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.rooms import RoomArea
 from placegraph.runtime.arrays import I32, Points
 
 
 @dataclass(frozen=True, eq=False)
-class HomeRoom:
-    """A room with its id, its floor's id, heights and grid."""
+class FloorRoom:
+    """A room with its id, and its floor's id, heights and grid."""
 
     id: str
-    floor: str
+    floor_id: str
     span: FloorSpan
-    grid: Grid
+    grid: PlanGrid
     area: RoomArea
 
 
-def find_homes(objects: Sequence[Points], rooms: Sequence[HomeRoom]) -> list[HomeRoom]:
-    """The room that holds most of each object's points; without any, the nearest one of its floor.
+def assign_rooms(objects: Sequence[Points], rooms: Sequence[FloorRoom]) -> list[FloorRoom]:
+    """For each object the room that holds most of its points; without any, the nearest one of its floor.
 
     objects: points (N, 3), N >= 1, of each, metres, world frame; rooms: floor by floor, at least one if any object.
     """
-    floors: dict[str, list[HomeRoom]] = {}
+    by_floor: dict[str, list[FloorRoom]] = {}
     for room in rooms:
-        floors.setdefault(room.floor, []).append(room)
-    here = list(floors.values())
-    zones = np.array([(some[0].span.zone_low, some[0].span.zone_high) for some in here]).reshape(-1, 2)
-    labels = [_label_image(some) for some in here]
-    homes = []
+        by_floor.setdefault(room.floor_id, []).append(room)
+    floors = list(by_floor.values())
+    zones = np.array([(floor[0].span.zone_low, floor[0].span.zone_high) for floor in floors]).reshape(-1, 2)
+    labels = [_label_image(floor) for floor in floors]
+    object_rooms = []
     for xyz in objects:
-        middle = xyz.mean(axis=0)
-        # the zones of floors meet with a small gap, and an object may reach over it: its middle decides
-        at = int(np.argmin(np.maximum(np.maximum(zones[:, 0] - middle[2], middle[2] - zones[:, 1]), 0)))
-        counts = np.bincount(labels[at][here[at][0].grid.cells(xyz)], minlength=len(here[at]) + 1)[1:]
+        center = xyz.mean(axis=0)
+        # the zones of floors meet with a small gap, and an object may reach over it: its centre decides
+        number = int(np.argmin(np.maximum(np.maximum(zones[:, 0] - center[2], center[2] - zones[:, 1]), 0)))
+        floor = floors[number]
+        counts = np.bincount(labels[number][floor[0].grid.cells(xyz)], minlength=len(floor) + 1)[1:]
         best = int(np.argmax(counts))
-        homes.append(here[at][best] if counts[best] else _nearest(middle, here[at]))
-    return homes
+        object_rooms.append(floor[best] if counts[best] else _nearest(center, floor))
+    return object_rooms
 
 
-def _label_image(rooms: list[HomeRoom]) -> I32:
+def _label_image(rooms: list[FloorRoom]) -> I32:
     """1 for the cells of the first room, 2 for those of the second, ...; rooms share no cells."""
     labels = np.zeros(rooms[0].grid.shape, np.int32)
     for number, room in enumerate(rooms, 1):
@@ -53,10 +55,10 @@ def _label_image(rooms: list[HomeRoom]) -> I32:
     return labels
 
 
-def _nearest(middle: Points, rooms: list[HomeRoom]) -> HomeRoom:
-    def gap(room: HomeRoom) -> float:
+def _nearest(xyz: Points, rooms: list[FloorRoom]) -> FloorRoom:
+    def distance_m(room: FloorRoom) -> float:
         rows, columns = np.nonzero(room.area.mask)
         cells = room.grid.origin + (np.stack((columns, rows), axis=1) + 0.5) * room.grid.cell_m
-        return float(np.linalg.norm(cells - middle[:2], axis=1).min())
+        return float(np.linalg.norm(cells - xyz[:2], axis=1).min())
 
-    return min(rooms, key=gap)
+    return min(rooms, key=distance_m)

@@ -1,10 +1,10 @@
 """Rooms of one floor from the walls seen from above.
 
 Source: paper, room layer (bird's-eye view, min-max, threshold, walls, distance field, Otsu seeds, watershed), with
-HOV-SG's working values. Departs: a wall is what fills a little of the slice's height in a piece of some length, so that
-the lintel of a door or archway parts rooms, however few points it has; rooms are limited to what was observed (rays and
-points); seeds are the maxima of the distance field that a doorway parts, since Otsu's one threshold hides a narrow
-corridor beside a hall.
+HOV-SG's working values. Not as in the paper: a wall is whatever fills a little of the slice's height in a piece of some
+length, so that the lintel of a door or archway separates rooms, however few points it has; rooms are limited to what
+was observed (rays and points); seeds are the maxima of the distance field that a doorway separates, since Otsu's single
+threshold hides a narrow corridor beside a hall.
 """
 
 from __future__ import annotations
@@ -16,51 +16,28 @@ import numpy as np
 from pydantic import BaseModel
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.watershed import Neck, flood
-from placegraph.runtime.arrays import F32, F64, I32, I64, Bool, Points
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid, floor_grid
+from placegraph.nodes.hierarchy.watershed import Neck, watershed
+from placegraph.runtime.arrays import F32, F64, I32, Bool, Points
 
 
 class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """Parameters of the room layer."""
+    """Parameters of the room layer. Values without a source were chosen by hand."""
 
     cell_m: float = 0.05  # HOV-SG
     slice_low_m: float = 1.5  # above the floor, HOV-SG
-    slice_high_m: float = 0.1  # below the ceiling; departs: HOV-SG's .3 cuts the lintels that a low camera sees
-    min_slice_m: float = 0.3  # departs: a scan that shows less than this of the slice has walls from lower down
-    partial_low_m: float = 1.0  # ... namely from here: over tables and the backs of chairs
+    slice_high_m: float = 0.1  # below the ceiling; HOV-SG's .3 cuts off the lintels that a low camera sees
+    min_slice_m: float = 0.3  # a scan that shows less than this of the slice takes walls from lower down, ...
+    partial_low_m: float = 1.0  # ... namely from here, above tables and the backs of chairs
     level_m: float = 0.1  # a wall counts by the levels of this height that it fills
-    wall_fill_m: float = 0.2  # departs: of the slice; HOV-SG's .25 of the fullest cell has no room for a lintel
-    smooth_m: float = 0.1  # of the distance field, departs: HOV-SG smooths over .5 m, which closes corridors
+    wall_fill_m: float = 0.2  # of the slice; HOV-SG's .25 of the fullest cell excludes lintels
+    smooth_m: float = 0.1  # of the distance field; HOV-SG smooths over .5 m, which closes corridors
     seed_min_m: float = 0.5  # HOV-SG: drop seeds under .5 m across
-    door_m: float = 1.6  # departs: openings up to this wide part rooms; best of 1.2, 1.4, 1.6 on 8 real maps (ipa)
-    neck_share: float = 0.7  # departs: ... if they are this much narrower than the smaller room
+    door_m: float = 1.6  # openings up to this width separate rooms; best of 1.2, 1.4, 1.6 on 8 real maps (ipa)
+    neck_share: float = 0.7  # ... if they are this much narrower than the smaller room
     close_m: float = 0.3  # gaps in what was observed that are closed
     room_min_m2: float = 1.0
-    wall_min_m: float = 1.0  # shorter pieces are furniture and lamps; less wall than this in all parts no rooms
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """Where a bird's-eye image lies: rows run along +y, columns along +x, in cells of `cell_m`."""
-
-    origin: F64  # (2,) metres, world, of the corner of cell (0, 0)
-    cell_m: float
-    shape: tuple[int, int]
-
-    def cells(self, xy: Points) -> tuple[I64, I64]:
-        """Row and column of points (N, 2) or more columns, clipped to the image."""
-        cells = np.floor((np.asarray(xy[:, :2], float) - self.origin) / self.cell_m).astype(np.int64)
-        return np.clip(cells[:, 1], 0, self.shape[0] - 1), np.clip(cells[:, 0], 0, self.shape[1] - 1)
-
-    def outline(self, mask: Bool) -> F64:
-        """Outer contour (K, 2) in metres, world, of the largest part of a mask, simplified to half a cell."""
-        # a border and doubled pixels: contours run through pixel centres and would lose half a cell on each side
-        big = cv2.resize(np.pad(mask.view(np.uint8), 1), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-        contours, _ = cv2.findContours(big, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        contour = max(contours, key=cv2.contourArea)
-        simple = cv2.approxPolyDP(contour, 1.0, True)
-        contour = simple if len(simple) >= 3 else contour  # a few cells would collapse to a line
-        return np.asarray((contour.reshape(-1, 2) + 0.5) / 2 - 1, float) * self.cell_m + self.origin
+    wall_min_m: float = 1.0  # shorter pieces are furniture and lamps; with less wall in all, the floor is one room
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,39 +48,31 @@ class RoomArea:
     outline: F64
 
 
-def floor_grid(xy: Points, cell_m: float) -> Grid:
-    """A grid around points (N, 2) or more columns, N >= 1, in metres with some cells to spare."""
-    low = np.floor(xy[:, :2].min(axis=0).astype(float) / cell_m) - 2
-    high = np.floor(xy[:, :2].max(axis=0).astype(float) / cell_m) + 3
-    columns, rows = (high - low).astype(int)
-    return Grid(low * cell_m, cell_m, (int(rows), int(columns)))
-
-
 def find_rooms(
     points_world: Points, free_points_world: Points, free_cell_m: float, span: FloorSpan, config: RoomConfig
-) -> tuple[Grid, list[RoomArea]]:
+) -> tuple[PlanGrid, list[RoomArea]]:
     """Rooms of one floor, largest first; at least one.
 
     points_world: (P, 3), P >= 1, and free_points_world: (F, 3) centres of cells seen through, of this floor's zone,
     metres, world frame; free_cell_m: size of those cells in plan.
-    Source: paper, section "Room Layer"; departures at the head of this file.
+    Source: paper, section "Room Layer"; differences at the head of this file.
     """
     grid = floor_grid(np.concatenate((points_world[:, :2], free_points_world[:, :2])), config.cell_m)
     walls = wall_mask(points_world, span, grid, config)
     observed = observed_mask(points_world, free_points_world, free_cell_m, grid, config)
-    found = areas_of(segment_rooms(walls, observed, config), grid, config)
-    return grid, found or [RoomArea(observed, grid.outline(observed))]
+    areas = room_areas(segment_rooms(walls, observed, config), grid, config)
+    return grid, areas or [RoomArea(observed, grid.outline(observed))]
 
 
-def areas_of(labels: I32, grid: Grid, config: RoomConfig) -> list[RoomArea]:
-    """Rooms of a label image, largest first, without those under `room_min_m2`; of only such ones the largest."""
+def room_areas(labels: I32, grid: PlanGrid, config: RoomConfig) -> list[RoomArea]:
+    """Rooms of a label image, largest first, without those under `room_min_m2` unless all are; then the largest."""
     masks = [labels == i for i in range(1, int(labels.max()) + 1)]
     masks = sorted(masks, key=lambda mask: -int(mask.sum()))  # stable: equals keep the order of their labels
     large = [mask for mask in masks if mask.sum() * config.cell_m**2 >= config.room_min_m2]
     return [RoomArea(mask, grid.outline(mask)) for mask in large or masks[:1]]
 
 
-def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomConfig) -> Bool:
+def wall_mask(points_world: Points, span: FloorSpan, grid: PlanGrid, config: RoomConfig) -> Bool:
     """Cells where the slice between furniture and ceiling is filled: walls, and the lintels of open doors."""
     above = points_world[:, 2] - span.low
     low, high = config.slice_low_m, span.high - span.low - config.slice_high_m
@@ -115,16 +84,16 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: Grid, config: RoomCon
     kernel = np.ones((3, 3), np.uint8)
     filled = np.zeros(grid.shape, np.uint8)  # a cell's number of levels
     for level in range(int(levels.max(initial=-1)) + 1):
-        here, seen = levels == level, np.zeros(grid.shape, np.uint8)
-        seen[rows[here], columns[here]] = 1
-        # a wall seen from a few places has holes: a cell's neighbours stand in for it, and the erosion takes it back
-        filled += np.asarray(cv2.dilate(seen, kernel), bool)
+        at_level, occupied = levels == level, np.zeros(grid.shape, np.uint8)
+        occupied[rows[at_level], columns[at_level]] = 1
+        # a wall seen from a few places has holes: it is dilated here, and eroded by as much below
+        filled += np.asarray(cv2.dilate(occupied, kernel), bool)
     wide = (filled >= round(config.wall_fill_m / config.level_m)).astype(np.uint8)
     walls = cv2.erode(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, kernel), kernel)
-    return walls_of_plan(np.asarray(walls, bool), config)
+    return keep_walls(np.asarray(walls, bool), config)
 
 
-def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid: Grid, config: RoomConfig) -> Bool:
+def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid: PlanGrid, config: RoomConfig) -> Bool:
     """Cells that a ray crossed or that hold a point, small gaps closed."""
     seen = np.zeros(grid.shape, np.uint8)
     seen[grid.cells(free_points)] = 1
@@ -137,32 +106,29 @@ def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid:
     return cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[reach:-reach, reach:-reach].astype(bool)
 
 
-def walls_of_plan(occupied: Bool, config: RoomConfig) -> Bool:
-    """Walls: what is occupied in pieces of `wall_min_m` or more; shorter ones are furniture and lamps.
-
-    Source: ours, measured on the ipa maps (README, "Results").
-    """
+def keep_walls(occupied: Bool, config: RoomConfig) -> Bool:
+    """Walls: the occupied pieces of `wall_min_m` or more; shorter ones are furniture and lamps."""
     _, pieces, boxes, _ = cv2.connectedComponentsWithStats(occupied.astype(np.uint8), connectivity=8)
     sides = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
     is_wall = sides * config.cell_m >= config.wall_min_m
-    is_wall[0] = False  # what is not occupied
+    is_wall[0] = False  # the label of cells that are not occupied
     return np.asarray(is_wall[pieces])
 
 
 def segment_rooms(walls: Bool, observed: Bool, config: RoomConfig) -> I32:
-    """Label image of rooms (0: none) from bool images of walls and of what was observed, in cells of `cell_m`."""
+    """Label image of rooms (0: none) from masks of walls and of what was observed, in cells of `cell_m`."""
     open_space = observed & ~walls
     if not open_space.any() or walls.sum() * config.cell_m < config.wall_min_m:
         return observed.astype(np.int32)
     field = distance_field(walls, config)
     field[~open_space] = 0
-    labels = flood(field, open_space, config.cell_m, config.seed_min_m / 2, lambda neck: _is_door(neck, config))
-    return labels if labels.any() else open_space.astype(np.int32)  # all of it is narrower than a seed
+    labels = watershed(field, open_space, config.cell_m, config.seed_min_m / 2, lambda neck: _is_door(neck, config))
+    return labels if labels.any() else open_space.astype(np.int32)  # everything is narrower than a seed
 
 
 def _is_door(neck: Neck, config: RoomConfig) -> bool:
-    """A neck at most as wide as a door and narrower than what lies on either side parts rooms."""
-    return 2 * neck.level <= config.door_m and neck.level <= config.neck_share * min(neck.heights)
+    """Whether a neck is at most as wide as a door and narrower than the rooms on both sides."""
+    return 2 * neck.level <= config.door_m and neck.level <= config.neck_share * min(neck.seed_levels)
 
 
 def distance_field(walls: Bool, config: RoomConfig) -> F32:

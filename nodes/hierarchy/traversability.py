@@ -1,8 +1,8 @@
-"""Where a robot can be on one floor: a grid of what is known to be free, on the floor's own grid of the room layer.
+"""Where a robot can be on one floor: an image of the known free cells, on the grid of the floor's rooms.
 
-A cell is passable when rays crossed it below the robot's height, nothing stands in it, and a floor was seen there; and
-where the camera went. Unknown is not passable. Levels other than the floor's own (split levels, stairs) are obstacles.
-Source: METHOD section 4 (free space carved for rooms and approach poses). The paper has none.
+A cell is passable when rays crossed it below the robot's height, nothing stands in it, and a floor was seen there, or
+when the camera went through it. Unknown cells are not passable. Levels other than the floor's own (split levels,
+stairs) are obstacles. The paper has no such step.
 """
 
 from __future__ import annotations
@@ -14,121 +14,121 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.rooms import Grid
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool, Points
 
-LEVEL_M = 0.1  # of the heights of obstacles
+LEVEL_M = 0.1  # step in which heights of obstacles are kept
 
 
-class TravelConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
-    """Parameters of connections, ways and approaches."""
+class TraversabilityConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
+    """The robot, and parameters of free space, connections, stairs and approach poses."""
 
-    robot_radius_m: float = Field(default=0.25, gt=0)  # a small service robot; also what the house's walker has
+    robot_radius_m: float = Field(default=0.25, gt=0)  # a small service robot; the simulated house's walker has it, too
     robot_height_m: float = Field(default=1.5, gt=0)  # what hangs higher is passed under
     step_m: float = Field(default=0.15, gt=0)  # lower things are noise of the floor, rugs and thresholds
     solid_points: int = Field(default=2, ge=1)  # voxels of a column that make an obstacle
-    # ... less than this of the fullest column within two cells is the noise of that wall: parted at .3, doors of two
-    # drawn houses come out 4 and 7 cm wider, and .006 less of where the robot may stand is truly free
+    # A column with less than this share of the fullest column within two cells is the noise of that wall. At .3, doors
+    # of two simulated houses come out 4 and 7 cm wider, and .006 less of where the robot may stand is truly free.
     fringe_share: float = Field(default=0.3, ge=0, le=1)
-    flat_cells: int = Field(default=7, ge=1, le=9)  # or, of a thin table top, cells of 3 x 3 with any voxel
-    floor_band_m: float = Field(default=0.12, gt=0)  # a point so near to the floor's height shows the floor
+    flat_cells: int = Field(default=7, ge=1, le=9)  # of 3 x 3, that hold a voxel: an obstacle, too (a thin table top)
+    floor_band_m: float = Field(default=0.12, gt=0)  # points so near to the floor's height show the floor
     close_m: float = Field(default=0.15, ge=0)  # gaps in the seen floor that are closed, half their width
-    blind_m: float = Field(default=1.0, ge=0)  # around where the camera stood: what lies right below is never seen
-    drop_m: float = Field(default=1.0, gt=0)  # ... unless something shows so far below the floor: the edge of a stair
-    wall_m: float = Field(default=0.5, gt=0)  # rooms reach so far into a passage to meet there
+    blind_m: float = Field(default=1.0, ge=0)  # around the camera's path: what lies right below it is never seen
+    drop_m: float = Field(default=1.0, gt=0)  # ... unless points so far below the floor show the edge of a stair
+    wall_m: float = Field(default=0.5, gt=0)  # rooms grow so far into a passage to meet there
     entry_m2: float = Field(default=0.1, gt=0)  # a connection leads to at least so much standing room on both sides
     path_gap_m: float = Field(default=1.0, gt=0)  # camera positions further apart are no path
     stand_m: float = Field(default=0.15, gt=0)  # the camera is that much off its usual height at most: under one step
     stairs_apart_m: float = Field(default=1.0, gt=0)  # climbs whose ends are nearer are one flight of stairs
     stairs_width_max_m: float = Field(default=3.0, gt=0)
     margin_m: float = Field(default=0.1, ge=0)  # of the robot when it faces an object: two cells
-    reach_m: float = Field(default=1.0, gt=0)  # from the robot's middle to the object's footprint at most
+    reach_m: float = Field(default=1.0, gt=0)  # from the robot's centre to the object's footprint at most
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class TraversabilityMap:
     """One floor: images (H, W) on its grid, rows along +y."""
 
-    grid: Grid
+    grid: PlanGrid
     low: float  # the floor's height, metres
     passable: Bool
-    clearance_m: F32  # from a passable cell's middle to the edge of the nearest one that is not; 0 there
-    standing: Bool  # the robot's middle may be here
-    tops: U8  # height of the highest thing below the robot's height, in steps of LEVEL_M from the floor
+    clearance_m: F32  # from a passable cell's centre to the edge of the nearest one that is not; 0 there
+    standable: Bool  # where the robot's centre may be
+    obstacle_levels: U8  # height of the highest thing below the robot's height, in steps of LEVEL_M from the floor
 
 
-def find_ground(
+def compute_traversability(
     points_world: Points,
-    deep_points_world: Points,
+    drop_off_points_world: Points,
     free_points_world: Points,
     free_cell_m: float,
-    steps_world: F64,
-    grid: Grid,
+    path_segments_world: F64,
+    grid: PlanGrid,
     span: FloorSpan,
-    config: TravelConfig,
-) -> Ground:
-    """The ground of one floor.
+    config: TraversabilityConfig,
+) -> TraversabilityMap:
+    """Where a robot can be on one floor.
 
     points_world (P, 3) and free_points_world (F, 3), centres of cells seen through, of the floor's zone;
-    deep_points_world: (Q, 3) see `deep_points`; steps_world: (K, 2, 3) pieces of the camera's path while it stood on
-    this floor. All metres, world frame; free_cell_m: size of the free cells in plan.
+    drop_off_points_world: (Q, 3), see `drop_off_points`; path_segments_world: (K, 2, 3) of the camera's path on this
+    floor. All metres, world frame; free_cell_m: size of the free cells in plan.
     """
     above = points_world[:, 2] - span.low
     solid = (above > config.step_m) & (above < config.robot_height_m)
-    things = points_world[solid]
-    obstacle = _obstacles(_count(things, grid), config)
-    path = _path(steps_world, grid)
-    free = _free(free_points_world, free_cell_m, grid, span, config)
+    obstacle_points = points_world[solid]
+    obstacle = _obstacles(_count(obstacle_points, grid), config)
+    path = _path_cells(path_segments_world, grid)
+    free = _free_cells(free_points_world, free_cell_m, grid, span, config)
     floor = _count(points_world[np.abs(above) <= config.floor_band_m], grid) > 0
-    floor = _closed(floor, round(config.close_m / grid.cell_m))
-    floor |= _blind(path, deep_points_world, grid, config)
-    # the camera was carried here: the robot's width around its path is free, too, but for what was seen to stand there
-    crossed = _grown(path, config.robot_radius_m / grid.cell_m + 1)
+    floor = _close_gaps(floor, round(config.close_m / grid.cell_m))
+    floor |= _blind_spots(path, drop_off_points_world, grid, config)
+    # the camera was carried here: the robot's width around its path is free, too, where nothing was seen to stand
+    crossed = _dilate(path, config.robot_radius_m / grid.cell_m + 1)
     passable = ((floor & free) | crossed) & ~obstacle | path
     clearance = _clearance(passable, grid.cell_m)
-    tops = _tops(things, above[solid], grid)
-    return Ground(grid, span.low, passable, clearance, (clearance >= config.robot_radius_m) | path, tops)
+    levels = _obstacle_levels(obstacle_points, above[solid], grid)
+    return TraversabilityMap(grid, span.low, passable, clearance, (clearance >= config.robot_radius_m) | path, levels)
 
 
-def deep_points(points_world: Points, span: FloorSpan, config: TravelConfig) -> Points:
+def drop_off_points(points_world: Points, span: FloorSpan, config: TraversabilityConfig) -> Points:
     """Of all points (P, 3) those (Q, 3) below the floor that show the ground falling away."""
     z = points_world[:, 2]
     return points_world[(z > span.low - config.drop_m) & (z < span.low - 2 * config.floor_band_m)]
 
 
-def _count(points: Points, grid: Grid) -> I64:
+def _count(points: Points, grid: PlanGrid) -> I64:
     rows, columns = grid.cells(points)
     flat = np.bincount(rows * grid.shape[1] + columns, minlength=grid.shape[0] * grid.shape[1])
     return flat.reshape(grid.shape)
 
 
-def _tops(points: Points, above_m: Points, grid: Grid) -> U8:
-    tops = np.zeros(grid.shape, np.uint8)
+def _obstacle_levels(points: Points, above_m: Points, grid: PlanGrid) -> U8:
+    image = np.zeros(grid.shape, np.uint8)
     levels = np.ceil(above_m / LEVEL_M).astype(np.uint8)
     order = np.argsort(levels, kind="stable")  # of several values for a cell the last stays: the highest
-    tops[grid.cells(points[order])] = levels[order]
-    return tops
+    image[grid.cells(points[order])] = levels[order]
+    return image
 
 
-def _obstacles(count: I64, config: TravelConfig) -> Bool:
+def _obstacles(count: I64, config: TraversabilityConfig) -> Bool:
     """Cells that something stands in or hangs over, from the number of voxels in their columns."""
     around = cv2.boxFilter((count > 0).astype(np.float32), -1, (3, 3), normalize=False)
     fullest = cv2.dilate(count.astype(np.float32), np.ones((5, 5), np.uint8))
-    some = (count > 0) & (count >= config.fringe_share * fullest)
-    return np.asarray(some & ((count >= config.solid_points) | (around > config.flat_cells - 0.5)))
+    occupied = (count > 0) & (count >= config.fringe_share * fullest)
+    return np.asarray(occupied & ((count >= config.solid_points) | (around > config.flat_cells - 0.5)))
 
 
-def _path(steps: F64, grid: Grid) -> Bool:
-    """The cells under pieces of a path (K, 2, 3)."""
+def _path_cells(segments: F64, grid: PlanGrid) -> Bool:
+    """The cells under the segments of a path (K, 2, 3)."""
     image = np.zeros(grid.shape, np.uint8)
     for (row0, row1), (column0, column1) in zip(
-        *(axis.reshape(-1, 2).tolist() for axis in grid.cells(steps.reshape(-1, 3))), strict=True
+        *(axis.reshape(-1, 2).tolist() for axis in grid.cells(segments.reshape(-1, 3))), strict=True
     ):
         cv2.line(image, (column0, row0), (column1, row1), 1, 1)
     return image > 0
 
 
-def _free(points: Points, cell_m: float, grid: Grid, span: FloorSpan, config: TravelConfig) -> Bool:
+def _free_cells(points: Points, cell_m: float, grid: PlanGrid, span: FloorSpan, config: TraversabilityConfig) -> Bool:
     above = points[:, 2] - span.low
     image = np.zeros(grid.shape, np.uint8)
     image[grid.cells(points[(above > 0) & (above < config.robot_height_m)])] = 1
@@ -136,18 +136,18 @@ def _free(points: Points, cell_m: float, grid: Grid, span: FloorSpan, config: Tr
     return np.asarray(cv2.dilate(image, np.ones((side, side), np.uint8))) > 0
 
 
-def _blind(path: Bool, deep: Points, grid: Grid, config: TravelConfig) -> Bool:
-    """Cells near the path, but for those where the ground falls away: a downward stair shows its treads and sides."""
-    drop = _grown(_count(deep, grid) > 0, config.close_m / grid.cell_m)
-    return _grown(path, config.blind_m / grid.cell_m) & ~drop
+def _blind_spots(path: Bool, drop_offs: Points, grid: PlanGrid, config: TraversabilityConfig) -> Bool:
+    """Cells near the path, except where the ground falls away: a downward stair shows its treads and sides."""
+    drop = _dilate(_count(drop_offs, grid) > 0, config.close_m / grid.cell_m)
+    return _dilate(path, config.blind_m / grid.cell_m) & ~drop
 
 
-def _grown(mask: Bool, cells: float) -> Bool:
+def _dilate(mask: Bool, cells: float) -> Bool:
     distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.asarray(distance <= cells) & bool(mask.any())
 
 
-def _closed(mask: Bool, reach: int) -> Bool:
+def _close_gaps(mask: Bool, reach: int) -> Bool:
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     padded = np.pad(mask, reach).astype(np.uint8)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)
@@ -157,5 +157,5 @@ def _closed(mask: Bool, reach: int) -> Bool:
 def _clearance(passable: Bool, cell_m: float) -> F32:
     padded = np.pad(passable, 1).astype(np.uint8)  # beyond the grid nothing is known
     distance = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
-    # an obstacle begins half a cell before its cell's middle
+    # an obstacle begins half a cell before its cell's centre
     return np.where(passable, distance * cell_m - cell_m / 2, 0).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Node `recorder`: every recorded message into a Rerun file or a live viewer, exactly, and drawn for a person."""
+"""Node `recorder`: writes every recorded message exactly into a Rerun file or a live viewer, and draws it."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from placegraph.nodes.recorder import draw_health as numbers
-from placegraph.nodes.recorder import draw_images as images
-from placegraph.nodes.recorder import draw_map as space
-from placegraph.nodes.recorder import draw_scene_graph as places
+from placegraph.nodes.recorder import draw_images, draw_map, draw_scene_graph
 from placegraph.nodes.recorder.blueprint import opening_view
-from placegraph.nodes.recorder.drawing import Picture
+from placegraph.nodes.recorder.draw_health import draw_health
+from placegraph.nodes.recorder.drawing import Canvas
 from placegraph.runtime import messages as m
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages.topics import TOPICS
@@ -23,18 +21,18 @@ from placegraph.runtime.recording import RecordingWriter, images_of
 
 RECORDED = tuple(topic.kind for topic in TOPICS.values() if topic.recorded)
 # A kind without an entry is recorded but not drawn.
-DRAWN: dict[type[m.Message], Callable[[Picture, Any, dict[str, bytes]], None]] = {
-    m.Frame: images.draw_frame,
-    m.Pose: space.draw_pose,
-    m.Keyframe: images.draw_keyframe,
-    m.Tags: images.draw_tags,
-    m.Detections: images.draw_detections,
-    m.Segments: images.draw_segments,
-    m.Map: space.draw_map,
-    m.Graph: places.draw_graph,
-    m.Question: places.draw_question,
-    m.Answer: places.draw_answer,
-    m.Health: numbers.draw_health,
+DRAWN: dict[type[m.Message], Callable[[Canvas, Any, dict[str, bytes]], None]] = {
+    m.Frame: draw_images.draw_frame,
+    m.Pose: draw_map.draw_pose,
+    m.Keyframe: draw_images.draw_keyframe,
+    m.Tags: draw_images.draw_tags,
+    m.Detections: draw_images.draw_detections,
+    m.Segments: draw_images.draw_segments,
+    m.Map: draw_map.draw_map,
+    m.Graph: draw_scene_graph.draw_graph,
+    m.Question: draw_scene_graph.draw_question,
+    m.Answer: draw_scene_graph.draw_answer,
+    m.Health: draw_health,
 }
 
 
@@ -47,11 +45,11 @@ class RecorderConfig(NodeConfig):
 
 
 class Recorder(Node):
-    """Writes what it takes, gives nothing."""
+    """Writes and draws its inputs; it has no outputs."""
 
     config_type: ClassVar[type[NodeConfig]] = RecorderConfig
     inputs = RECORDED
-    optional = (m.Frame, *RECORDED)  # whatever the other nodes of a dataflow give
+    optional = (m.Frame, *RECORDED)  # whatever the other nodes of a dataflow publish
 
     def __init__(self, config: RecorderConfig, context: Context) -> None:
         super().__init__(config, context)
@@ -63,7 +61,7 @@ class Recorder(Node):
             raise ConfigError("[nodes.recorder] file is empty and viewer_port is 0: nothing would be recorded or shown")
         self.inputs = (m.Frame, *RECORDED) if config.frames else RECORDED
         self._writer: RecordingWriter | None = None
-        self._picture: Picture | None = None
+        self._picture: Canvas | None = None
 
     def start(self) -> None:
         """Open the file and the port; raises ConfigError when one of them cannot be opened."""
@@ -77,8 +75,8 @@ class Recorder(Node):
             viewer_port=self.config.viewer_port,
             blueprint=opening_view(self.config.frames),
         )
-        self._picture = Picture(self._writer.stream, self.config.frames)
-        space.draw_world(self._picture)
+        self._picture = Canvas(self._writer.stream, self.config.frames)
+        draw_map.draw_world(self._picture)
 
     def step(self, message: m.Message) -> Sequence[m.Message]:
         """Write and draw one message. Raises SchemaError for a message that is not what it declares."""

@@ -1,4 +1,4 @@
-"""How a recording opens: the world large, what the camera sees, the tree, the words and the plots around it."""
+"""The layout in which a recording opens: the world, and around it the images, the scene graph, texts and plots."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from placegraph.runtime.recording import FRAME
 
 
 def opening_view(frames: bool) -> rrb.Blueprint:
-    """The viewer's first layout. `frames`: the camera moves with every frame, not with keyframes alone."""
-    so_far = rrb.VisibleTimeRanges(
+    """The viewer's first layout. `frames`: every camera frame is drawn, not keyframes alone."""
+    until_now = rrb.VisibleTimeRanges(
         timeline=FRAME, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
     )
     world = rrb.Spatial3DView(
@@ -21,10 +21,10 @@ def opening_view(frames: bool) -> rrb.Blueprint:
             "- $origin/camera/image/detections",
             "- $origin/overhead",
         ],
-        overrides={"world/path": so_far},
+        overrides={"world/path": until_now},
     )
     image = "world/camera/image"
-    seen = rrb.Tabs(
+    images = rrb.Tabs(
         rrb.Spatial2DView(
             origin=image, name="Camera" if frames else "Keyframe", contents=["+ $origin/**", "- $origin/depth"]
         ),
@@ -38,7 +38,7 @@ def opening_view(frames: bool) -> rrb.Blueprint:
         rrb.TimeSeriesView(origin="health/memory_mb", name="Memory, MB"),
         rrb.TextLogView(origin="log", name="Log"),
     )
-    words = rrb.Horizontal(
+    texts_and_plots = rrb.Horizontal(
         rrb.TextDocumentView(origin="answers", name="Answer"),
         rrb.TextDocumentView(origin="tags", name="Tags"),
         plots,
@@ -46,11 +46,11 @@ def opening_view(frames: bool) -> rrb.Blueprint:
     )
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(world, words, row_shares=[5, 2]),
-            rrb.Vertical(seen, rrb.GraphView(origin="graph", name="Scene graph"), row_shares=[2, 3]),
+            rrb.Vertical(world, texts_and_plots, row_shares=[5, 2]),
+            rrb.Vertical(images, rrb.GraphView(origin="graph", name="Scene graph"), row_shares=[2, 3]),
             column_shares=[5, 3],
         ),
-        # A person wants the newest state first: of a live run as it grows, of a finished one its whole map.
+        # Show the newest state: a live run as it grows, a finished one with its whole map.
         rrb.TimePanel(timeline=FRAME, state="collapsed", play_state="following"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),

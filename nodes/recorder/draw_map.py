@@ -1,4 +1,4 @@
-"""Draw what is in the world: the camera's path, the map's points, the objects."""
+"""Draw the world: the camera's path, the points of the map, and its objects."""
 
 from __future__ import annotations
 
@@ -6,47 +6,47 @@ import numpy as np
 import rerun as rr
 
 from placegraph.nodes.recorder.draw_images import draw_camera_pose
-from placegraph.nodes.recorder.drawing import Picture, color_of
+from placegraph.nodes.recorder.drawing import Canvas, color_of
 from placegraph.runtime import messages as m
 from placegraph.runtime.arrays import F64
 
-MAX_POINTS = 100_000  # drawn; the exact cloud lies in /messages
+MAX_POINTS = 100_000  # drawn; the exact cloud is in /messages
 POINT_RADIUS_M = 0.012
-OVERHEAD_M = 0.2  # over the camera
-TRUSTED, DOUBTED, CORRECTED = (90, 200, 255), (255, 80, 60), (120, 255, 120)
+OVERHEAD_M = 0.2  # over the camera's highest position, see draw_map
+TRUSTED, UNTRUSTED, CORRECTED = (90, 200, 255), (255, 80, 60), (120, 255, 120)
 
 
-def draw_world(picture: Picture) -> None:
-    """What holds for the whole recording: the world has z up."""
-    picture.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+def draw_world(canvas: Canvas) -> None:
+    """What holds for the whole recording: the world's z axis points up; names and colours of the plots."""
+    canvas.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for path, name, color in (
         ("quality", "quality", (90, 200, 255)),
         ("residual_m", "residual, m", (255, 180, 60)),
         ("innovation_m", "innovation, m", (230, 110, 220)),
     ):
-        picture.log(f"pose/{path}", rr.SeriesLines(names=[name], colors=[color]), static=True)
+        canvas.log(f"pose/{path}", rr.SeriesLines(names=[name], colors=[color]), static=True)
 
 
-def draw_pose(picture: Picture, pose: m.Pose, pngs: dict[str, bytes]) -> None:
-    """One step of the path, red where it is not trusted, and how good the pose is."""
+def draw_pose(canvas: Canvas, pose: m.Pose, pngs: dict[str, bytes]) -> None:
+    """One step of the path, red where the pose is not trusted, and the pose's quality."""
     x, y, z = pose.world_from_camera[:3, 3].tolist()
-    step = [picture.last_position or (x, y, z), (x, y, z)]
-    picture.last_position = (x, y, z)
-    color = TRUSTED if pose.trusted else DOUBTED
-    picture.log("world/path", rr.LineStrips3D([step], colors=[color], radii=[0.008]))
-    if picture.frames:
-        draw_camera_pose(picture, pose.world_from_camera)
+    step = [canvas.last_position or (x, y, z), (x, y, z)]
+    canvas.last_position = (x, y, z)
+    color = TRUSTED if pose.trusted else UNTRUSTED
+    canvas.log("world/path", rr.LineStrips3D([step], colors=[color], radii=[0.008]))
+    if canvas.frames:
+        draw_camera_pose(canvas, pose.world_from_camera)
     for name in ("quality", "residual_m", "innovation_m"):
-        picture.log(f"pose/{name}", rr.Scalars(getattr(pose, name)))
+        canvas.log(f"pose/{name}", rr.Scalars(getattr(pose, name)))
     if not pose.trusted:
         text = f"frame {pose.frame_id}: pose not trusted: {pose.reason}"
-        picture.log("log/pose", rr.TextLog(text, level=rr.TextLogLevel.WARN))
+        canvas.log("log/pose", rr.TextLog(text, level=rr.TextLogLevel.WARN))
 
 
-def draw_map(picture: Picture, map_: m.Map, pngs: dict[str, bytes]) -> None:
-    """The cloud in its own colours, keyframes and one named box for each object; all replace the former ones.
+def draw_map(canvas: Canvas, map_: m.Map, pngs: dict[str, bytes]) -> None:
+    """The cloud in its own colours, the path of keyframes and a named box for each object, in place of the last map's.
 
-    What lies over the camera's highest place has an entity of its own, which the opening view hides: one looks into
+    Points over the camera's highest position have an entity of their own, which the first layout hides: it looks into
     the rooms from above, and a ceiling would cover them.
     """
     stride = max(1, -(-len(map_.points_world) // MAX_POINTS))
@@ -54,10 +54,10 @@ def draw_map(picture: Picture, map_: m.Map, pngs: dict[str, bytes]) -> None:
     over_m = map_.camera_positions_world[:, 2].max(initial=-np.inf) + OVERHEAD_M
     for path, part in (("world/map", points[:, 2] <= over_m), ("world/overhead", points[:, 2] > over_m)):
         radius_m = max(POINT_RADIUS_M, map_.voxel_m / 2)
-        picture.log(path, rr.Points3D(points[part], colors=colors[part], radii=radius_m))
-    # the path as it was seen, "world/path", stays where odometry had it; this one moves with the map
-    picture.log("world/keyframes", rr.LineStrips3D([map_.camera_positions_world], colors=[CORRECTED], radii=[0.012]))
-    picture.replace("objects", {f"world/objects/O{i}": box for i, box in _object_boxes(map_)})
+        canvas.log(path, rr.Points3D(points[part], colors=colors[part], radii=radius_m))
+    # "world/path" stays where odometry put it; this path moves with the map
+    canvas.log("world/keyframes", rr.LineStrips3D([map_.camera_positions_world], colors=[CORRECTED], radii=[0.012]))
+    canvas.replace("objects", {f"world/objects/O{i}": box for i, box in _object_boxes(map_)})
 
 
 def _object_boxes(map_: m.Map) -> list[tuple[int, rr.Boxes3D]]:

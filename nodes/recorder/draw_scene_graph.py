@@ -1,4 +1,4 @@
-"""Draw the scene graph: outlines of floors, rooms and locations, the tree; questions and answers."""
+"""Draw the scene graph (outlines of floors, rooms and locations, connections, the tree), questions and answers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 
 from placegraph.nodes.recorder.draw_map import named_box
-from placegraph.nodes.recorder.drawing import Color, Picture, color_of, markdown
+from placegraph.nodes.recorder.drawing import Canvas, Color, color_of, markdown
 from placegraph.runtime import messages as m
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Node, SceneGraph
@@ -21,25 +21,25 @@ LAYER_COLORS: dict[str, Color] = {
     "room": (110, 220, 140),
     "location": (255, 190, 80),
 }
-OUTLINES = {"floor": "floors", "room": "rooms", "location": "locations"}
-OUTLINE_RAISE_M = {"floor": 0.0, "room": 0.02, "location": 0.04}  # they share the floor's height: none hides another
+OUTLINE_GROUPS = {"floor": "floors", "room": "rooms", "location": "locations"}
+OUTLINE_RAISE_M = {"floor": 0.0, "room": 0.02, "location": 0.04}  # above the floor, so that none hides another
 OUTLINE_RADIUS_M = {"floor": 0.01, "room": 0.02, "location": 0.012}
 CONNECTION_COLORS: dict[str, Color] = {"door": (255, 120, 220), "opening": (255, 180, 235), "stairs": (255, 90, 90)}
-WAY_COLOR: Color = (200, 120, 190)
+ROUTE_SEGMENT_COLOR: Color = (200, 120, 190)
 CONNECTION_RAISE_M = 0.06
 ANSWER_COLOR: Color = (255, 230, 0)
 
 
-def draw_graph(picture: Picture, graph: m.Graph, pngs: dict[str, bytes]) -> None:
-    """Outlines in the world and the whole tree beside it; both replace the former ones."""
+def draw_graph(canvas: Canvas, graph: m.Graph, pngs: dict[str, bytes]) -> None:
+    """Outlines in the world and the whole tree; both replace those of the last graph."""
     scene = SceneGraph.from_json(graph.json, f"Graph revision {graph.revision}")
     outlines = {
-        f"world/{OUTLINES[node.layer]}/{node.id}": _outline(node)
+        f"world/{OUTLINE_GROUPS[node.layer]}/{node.id}": _outline(node)
         for node in scene.nodes.values()
-        if node.layer in OUTLINES
+        if node.layer in OUTLINE_GROUPS
     }
-    picture.replace("outlines", outlines)
-    draw_connections(picture, scene)
+    canvas.replace("outlines", outlines)
+    draw_connections(canvas, scene)
     nodes = list(scene.nodes.values())
     positions = _tree_positions(scene)
     drawn = rr.GraphNodes(
@@ -50,24 +50,25 @@ def draw_graph(picture: Picture, graph: m.Graph, pngs: dict[str, bytes]) -> None
         show_labels=True,
     )
     edges = rr.GraphEdges([(node.parent, node.id) for node in nodes if node.parent], graph_type="directed")
-    picture.log("graph", drawn, edges)
+    canvas.log("graph", drawn, edges)
 
 
-def draw_connections(picture: Picture, scene: SceneGraph) -> None:
-    """Doors and openings as discs of their width, stairs as a line, the ways between them in one thin net."""
+def draw_connections(canvas: Canvas, scene: SceneGraph) -> None:
+    """Doors and openings as discs of their width, stairs as lines, route segments as thin lines."""
     drawn: dict[str, Any] = {}
-    for one in scene.connections.values():
-        look: dict[str, Any] = {
-            "colors": [CONNECTION_COLORS[one.kind]],
-            "labels": [f"{one.id} {one.kind}"],
+    for connection in scene.connections.values():
+        style: dict[str, Any] = {
+            "colors": [CONNECTION_COLORS[connection.kind]],
+            "labels": [f"{connection.id} {connection.kind}"],
             "show_labels": True,
         }
-        ends = one.ends + np.array([0, 0, CONNECTION_RAISE_M])
-        if one.kind == "stairs":
-            drawn[f"world/connections/{one.id}"] = rr.LineStrips3D([ends], radii=[0.03], **look)
+        ends = connection.ends + np.array([0, 0, CONNECTION_RAISE_M])
+        path = f"world/connections/{connection.id}"
+        if connection.kind == "stairs":
+            drawn[path] = rr.LineStrips3D([ends], radii=[0.03], **style)
         else:
-            half = np.array([[one.width_m / 2, one.width_m / 2, 0.01]])
-            drawn[f"world/connections/{one.id}"] = rr.Ellipsoids3D(centers=ends[:1], half_sizes=half, **look)
+            half_sizes = np.array([[connection.width_m / 2, connection.width_m / 2, 0.01]])
+            drawn[path] = rr.Ellipsoids3D(centers=ends[:1], half_sizes=half_sizes, **style)
     if scene.route_segments:
         strips = [
             np.column_stack(
@@ -75,8 +76,8 @@ def draw_connections(picture: Picture, scene: SceneGraph) -> None:
             )
             for segment in scene.route_segments
         ]
-        drawn["world/ways"] = rr.LineStrips3D(strips, colors=[WAY_COLOR], radii=[0.006])
-    picture.replace("connections", drawn)
+        drawn["world/ways"] = rr.LineStrips3D(strips, colors=[ROUTE_SEGMENT_COLOR], radii=[0.006])
+    canvas.replace("connections", drawn)
 
 
 def _label(node: Node) -> str:
@@ -98,7 +99,7 @@ def _outline(node: Node) -> rr.LineStrips3D:
 
 
 def _tree_positions(scene: SceneGraph) -> dict[str, tuple[float, float]]:
-    """Where each node stands in the drawn tree: a leaf has a row of its own, a parent the middle of its children."""
+    """Position (px) of each node in the drawn tree: a leaf has its own row, a parent the middle row of its children."""
     columns = {"building": 0, "floor": 1, "room": 2, "location": 3, "object": 4}
     positions: dict[str, tuple[float, float]] = {}
     rows = 0.0
@@ -116,37 +117,37 @@ def _tree_positions(scene: SceneGraph) -> dict[str, tuple[float, float]]:
     return positions
 
 
-def draw_question(picture: Picture, question: m.Question, pngs: dict[str, bytes]) -> None:
+def draw_question(canvas: Canvas, question: m.Question, pngs: dict[str, bytes]) -> None:
     """The question, until its answer comes."""
-    picture.questions[question.question_id] = question.text
-    picture.log("log/questions", rr.TextLog(f"{question.question_id}: {question.text}", level=rr.TextLogLevel.INFO))
+    canvas.questions[question.question_id] = question.text
+    canvas.log("log/questions", rr.TextLog(f"{question.question_id}: {question.text}", level=rr.TextLogLevel.INFO))
     text = f"{markdown(question.text)}\n\n(thinking)"
-    picture.log("answers", rr.TextDocument(text, media_type="text/markdown"))
+    canvas.log("answers", rr.TextDocument(text, media_type="text/markdown"))
 
 
-def draw_answer(picture: Picture, answer: m.Answer, pngs: dict[str, bytes]) -> None:
-    """The answer in words, and a bright box around what was found. Raises SchemaError for JSON that is none."""
+def draw_answer(canvas: Canvas, answer: m.Answer, pngs: dict[str, bytes]) -> None:
+    """The answer as text, and a bright box around the object. Raises SchemaError if the reply is not a JSON object."""
     try:
         reply = json.loads(answer.json)
     except json.JSONDecodeError as error:
         raise SchemaError(f"Answer {answer.question_id}: not JSON: {error}") from None
     if not isinstance(reply, dict):
         raise SchemaError(f"Answer {answer.question_id}: expected a JSON object, found {type(reply).__name__}")
-    asked = picture.questions.pop(answer.question_id, "") or str(reply.get("question", answer.question_id))
-    picture.log("answers", rr.TextDocument(_answer_text(asked, reply), media_type="text/markdown"))
-    found = str(reply.get("object_id") or reply.get("status", ""))
-    picture.log("log/questions", rr.TextLog(f"{answer.question_id}: {found}", level=rr.TextLogLevel.INFO))
+    question = canvas.questions.pop(answer.question_id, "") or str(reply.get("question", answer.question_id))
+    canvas.log("answers", rr.TextDocument(_answer_text(question, reply), media_type="text/markdown"))
+    outcome = str(reply.get("object_id") or reply.get("status", ""))
+    canvas.log("log/questions", rr.TextLog(f"{answer.question_id}: {outcome}", level=rr.TextLogLevel.INFO))
     boxes = {}
     if reply.get("object_id") and reply.get("box"):
         low, high = np.array(reply["box"], float)
         oriented = np.array([*(low + high) / 2, *(high - low) + 0.06, 0.0])
         label = f"ANSWER: {reply.get('name', 'object')} {reply['object_id']}"
         boxes = {"world/answer": named_box(oriented, label, ANSWER_COLOR, radius_m=0.02)}
-    picture.replace("answer", boxes)
+    canvas.replace("answer", boxes)
 
 
-def _answer_text(asked: str, reply: dict[str, Any]) -> str:
-    lines = [markdown(asked), ""]
+def _answer_text(question: str, reply: dict[str, Any]) -> str:
+    lines = [markdown(question), ""]
     if reply.get("object_id"):
         sure = "" if reply.get("sure", True) else " (not sure)"
         lines.append(f"### {markdown(str(reply.get('name', 'object')))} {markdown(str(reply['object_id']))}{sure}")

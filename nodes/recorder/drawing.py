@@ -1,4 +1,4 @@
-"""What all drawings share: the stream, what is on the screen, and colours by name."""
+"""What all drawing functions share: the Rerun stream, what is shown now, and colours by name."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import rerun as rr
 Color = tuple[int, int, int]
 
 
-class Picture:
-    """The drawn half of a recording. `frames`: every camera frame is drawn, not keyframes alone."""
+class Canvas:
+    """Draws into a Rerun stream and knows what it shows. `frames`: every camera frame is drawn, not keyframes alone."""
 
     def __init__(self, stream: rr.RecordingStream, frames: bool) -> None:
         self.frames = frames
@@ -25,11 +25,11 @@ class Picture:
         self._shown: dict[str, set[str]] = {}
 
     def log(self, path: str | list[object], *entities: Any, static: bool = False) -> None:
-        """Log at the time of the message in hand; bad input raises instead of warning."""
+        """Log entities at the time of the current message; bad input raises instead of warning."""
         self._stream.log(path, *entities, static=static, strict=True)
 
     def replace(self, group: str, entities: Mapping[str, Any]) -> None:
-        """Show exactly these entities of a group (path to archetype) from now on: the vanished are cleared."""
+        """Show exactly these entities of a group (path to archetype) from now on; the group's others are cleared."""
         for path in sorted(self._shown.get(group, set()) - set(entities)):
             self.log(path, rr.Clear(recursive=False))
         for path, entity in entities.items():
@@ -42,19 +42,19 @@ class Picture:
         for name in new:
             self.class_ids[name] = len(self.class_ids) + 1
         if new:
-            known = [rr.AnnotationInfo(id=0, label="", color=(0, 0, 0, 0))]  # no mask: seen through
-            known += [rr.AnnotationInfo(id=i, label=name, color=color_of(name)) for name, i in self.class_ids.items()]
-            self.log("world/camera/image", rr.AnnotationContext(known), static=True)
+            classes = [rr.AnnotationInfo(id=0, label="", color=(0, 0, 0, 0))]  # no mask: transparent
+            classes += [rr.AnnotationInfo(id=i, label=name, color=color_of(name)) for name, i in self.class_ids.items()]
+            self.log("world/camera/image", rr.AnnotationContext(classes), static=True)
         return [self.class_ids[name] for name in names]
 
 
 def color_of(name: str) -> Color:
-    """The same well visible sRGB colour for a name in every run."""
+    """A bright sRGB colour for a name, the same in every run."""
     code = zlib.crc32(name.encode())
     red, green, blue = colorsys.hsv_to_rgb((code & 0xFFFF) / 0x10000, 0.55 + 0.35 * ((code >> 16) & 0xFF) / 255, 1.0)
     return round(red * 255), round(green * 255), round(blue * 255)
 
 
 def markdown(text: str) -> str:
-    """Text from outside as Markdown shows it: nothing in it becomes a link, an image or a heading."""
+    """Markdown that shows a text literally: nothing in it becomes a link, an image or a heading."""
     return "".join(f"\\{char}" if char in r"\`*_{}[]<>()#+-.!|~" else char for char in " ".join(text.split()))

@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from placegraph.nodes.hierarchy.rooms import floor_grid
+from placegraph.nodes.hierarchy.plan_grid import floor_grid
 from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Node, SceneGraph

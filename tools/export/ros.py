@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from placegraph.nodes.hierarchy.rooms import Grid, floor_grid
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid, floor_grid
 from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import Node, SceneGraph
@@ -40,7 +40,7 @@ def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
     return written
 
 
-def occupancy(xyz: F32, floor: Node, rooms: list[Node]) -> tuple[Grid, U8]:
+def occupancy(xyz: F32, floor: Node, rooms: list[Node]) -> tuple[PlanGrid, U8]:
     """Grid and image (rows along +y) of one floor from the cloud (P, 3), metres, world frame."""
     above = xyz[:, 2] - floor.box[0, 2]
     solid = xyz[(above > CLEAR_M) & (above < TALL_M) & (xyz[:, 2] < floor.box[1, 2])]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.nodes.hierarchy.path_planning import length_of, reach_from
-from placegraph.nodes.hierarchy.rooms import Grid
+from placegraph.nodes.hierarchy.path_planning import path_length_m, shortest_paths
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.model import Floor, House, Stairs
 from placegraph.tools.simulator.space import PASSAGES, free_grid, inside
@@ -84,10 +84,10 @@ def _lengths(house: House, floor: Floor, here: list[tuple[int, F64]]) -> dict[tu
             nearest = int(np.argmin(apart))
             cells.append((int(rows[nearest]), int(columns[nearest])))
             ids.append(i)
-    reach = reach_from(cells, free, Grid(origin, CELL_M, (free.shape[0], free.shape[1])))
+    paths = shortest_paths(cells, free, PlanGrid(origin, CELL_M, (free.shape[0], free.shape[1])))
     return {
-        (ids[i], ids[j]): length_of(reach.way(i, cells[j]))
+        (ids[i], ids[j]): path_length_m(paths.path(i, cells[j]))
         for i in range(len(ids))
         for j in range(i + 1, len(ids))
-        if np.isfinite(reach.distance_m[i][cells[j]])
+        if np.isfinite(paths.distance_m[i][cells[j]])
     }

@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from placegraph.nodes.hierarchy.birds_eye_view import SIZE_PX, bird_eye
+from placegraph.nodes.hierarchy.birds_eye_view import SIZE_PX, birds_eye_image
 from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.locations import LocationConfig
-from placegraph.nodes.hierarchy.rooms import Grid
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.runtime.arrays import F32, F64, U8
 from placegraph.runtime.errors import SourceError
 from placegraph.tools.simulator.build import build
@@ -99,7 +99,7 @@ def turned(scan: RoomScan, random: np.random.Generator) -> RoomScan:
 
 def image_of(scan: RoomScan) -> tuple[U8, Shown]:
     """The bird's-eye image of a scan, and the true boxes and masks of the locations of which enough was mapped."""
-    image, grid = bird_eye(scan.objects, span_of(scan), LocationConfig().band_high)
+    image, grid = birds_eye_image(scan.objects, span_of(scan), LocationConfig().band_high)
     seen = np.bincount([where for where in scan.location if where >= 0], minlength=len(scan.outlines))
     boxes, masks = [], []
     for outline in (xy for xy, count in zip(scan.outlines, seen, strict=True) if count >= MIN_OBJECTS):
@@ -112,7 +112,7 @@ def image_of(scan: RoomScan) -> tuple[U8, Shown]:
     )
 
 
-def drawn(outline: F64, grid: Grid) -> F32:
+def drawn(outline: F64, grid: PlanGrid) -> F32:
     """(SIZE_PX / 4, SIZE_PX / 4) share of each coarse cell that is inside an outline (K, 2), metres, world frame."""
     pixels = np.round((outline - grid.origin) / grid.cell_m - 0.5).astype(np.int32)
     mask = cv2.fillPoly(np.zeros(grid.shape, np.float32), [pixels], 1.0)

@@ -149,7 +149,7 @@ def test_objects_that_their_views_doubt_are_not_in_the_map(view):
     assert names(0.0) == ["chair", "cup", "table"] and names(0.3) == ["chair", "table"] and names(0.9) == []
 
 
-def test_a_move_told_with_a_keyframe_whose_segments_were_lost_is_followed(view):
+def test_a_correction_of_a_keyframe_whose_segments_were_lost_is_applied(view):
     node = NODE(NODE.config_type(map_every=1, submap={"keyframes": 1}), Context(produced_kinds=("Correction",)))
     first, lost, third = circle(view, 3)
     moved = first[0].world_from_camera.copy()

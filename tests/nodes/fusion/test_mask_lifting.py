@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from placegraph.nodes.fusion.mask_lifting import LiftConfig, exclusive_masks, lift
+from placegraph.nodes.fusion.mask_lifting import LiftConfig, exclusive_masks, lift_masks
 from placegraph.nodes.fusion.voxel_map import depth_edges
 from placegraph.runtime.errors import SchemaError
 
@@ -14,7 +14,7 @@ WALL = ("", (-3, 2.0, 0), (3, 2.1, 2.5))
 
 def lifted(keyframe, segments, **changes):
     depth = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
-    return lift(keyframe, depth, depth_edges(depth), segments, LiftConfig(**changes))
+    return lift_masks(keyframe, depth, depth_edges(depth), segments, LiftConfig(**changes))
 
 
 def test_no_masks(view):

@@ -1,14 +1,14 @@
 import numpy as np
 
 from placegraph.nodes.fusion.mask_lifting import Observation
-from placegraph.nodes.fusion.object_instance import Instance
-from placegraph.nodes.fusion.voxel_index import pack, sum_by_key
+from placegraph.nodes.fusion.object_instance import ObjectInstance
+from placegraph.nodes.fusion.voxel_index import sum_by_key, voxel_keys
 from placegraph.runtime.vision.geometry import bounding_box
 
 
 def seen(xyz, name="cup", score=0.5):
     values = np.concatenate((xyz, np.tile((10.0, 20, 30), (len(xyz), 1)), np.ones((len(xyz), 2))), axis=1)
-    keys, values = sum_by_key(pack(xyz, 0.025), values)
+    keys, values = sum_by_key(voxel_keys(xyz, 0.025), values)
     points = values[:, :3] / values[:, 6:7]
     return Observation(name, score, keys, values, points, bounding_box(points))
 
@@ -18,44 +18,44 @@ def block(low=0.0):
     return low + np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
 
 
-def test_one_point_is_its_own_solid():
-    points, color, *_ = Instance(0, seen(np.full((1, 3), 0.5)), 0, 0).solid(0.075, 10)
+def test_geometry_of_one_point():
+    points, color, *_ = ObjectInstance(0, seen(np.full((1, 3), 0.5)), 0, 0).geometry(0.075, 10)
     assert np.allclose(points, 0.5) and color.tolist() == [10, 20, 30]
 
 
 def test_edge_points_of_single_views_do_not_inflate_the_box():
-    instance = Instance(0, seen(np.r_[block(), [[0.6, 0.1, 0.1]]]), 0, 0)
+    instance = ObjectInstance(0, seen(np.r_[block(), [[0.6, 0.1, 0.1]]]), 0, 0)
     for k in range(1, 5):
         instance.update(seen(np.r_[block(), [[0.6 + 0.1 * k, 0.1, 0.1]]]), k, k)
     assert instance.box[1, 0] > 0.9
-    box = bounding_box(instance.solid(0.075, 10)[0])
+    box = bounding_box(instance.geometry(0.075, 10)[0])
     assert np.allclose(box, [[0.0125] * 3, [0.1875] * 3], atol=0.001)
 
 
 def test_an_object_seen_from_all_around_keeps_every_side():
     parts = [block(0.175 * k) for k in range(5)]
-    instance = Instance(0, seen(parts[0]), 0, 0)
+    instance = ObjectInstance(0, seen(parts[0]), 0, 0)
     for k in range(1, 5):
         instance.update(seen(parts[k]), k, k)
-    points = instance.solid(0.075, 10).points
+    points = instance.geometry(0.075, 10).points
     assert points[:, 0].max() > 0.85 and points[:, 0].min() < 0.05
 
 
 def test_a_small_leak_onto_the_background_goes():
     leak = np.array([[2.0, 0.1, 0.0125 + 0.025 * i] for i in range(12)])
-    instance = Instance(0, seen(np.r_[block(), leak]), 0, 0)
-    assert instance.solid(0.075, 5)[0][:, 0].max() < 0.2
+    instance = ObjectInstance(0, seen(np.r_[block(), leak]), 0, 0)
+    assert instance.geometry(0.075, 5)[0][:, 0].max() < 0.2
 
 
-def test_absorbing_adds_views_and_votes():
-    a, b = Instance(0, seen(block(), "cup"), 0, 3), Instance(1, seen(block(), "mug", 0.7), 1, 9)
-    a.absorb(b)
+def test_merging_adds_views_and_votes():
+    a, b = ObjectInstance(0, seen(block(), "cup"), 0, 3), ObjectInstance(1, seen(block(), "mug", 0.7), 1, 9)
+    a.merge(b)
     assert a.observations == 2 and (a.first_frame, a.last_frame) == (3, 9)
-    assert a.tags() == [("mug", 0.7), ("cup", 0.5)]
+    assert a.ranked_votes() == [("mug", 0.7), ("cup", 0.5)]
     assert len(a.points) == len(block()) and (a.values[:, 7] == 2).all()
 
 
 def test_equal_votes_are_ordered_by_name():
-    a = Instance(0, seen(block(), "mug"), 0, 0)
+    a = ObjectInstance(0, seen(block(), "mug"), 0, 0)
     a.update(seen(block(), "cup"), 1, 1)
-    assert [name for name, _ in a.tags()] == ["cup", "mug"]
+    assert [name for name, _ in a.ranked_votes()] == ["cup", "mug"]

@@ -21,32 +21,36 @@ def moving(**moved):
 
 def three(count=3):
     submaps = Submaps(SubmapConfig(keyframes=3))
-    assert [submaps.enter(10 * k, at(k)) for k in range(count)] == [k // 3 for k in range(count)]
+    assert [submaps.add_keyframe(10 * k, at(k)) for k in range(count)] == [k // 3 for k in range(count)]
     return submaps
 
 
 def test_no_keyframes_and_no_moves():
     submaps = Submaps(SubmapConfig())
-    assert submaps.positions.shape == (0, 3) and submaps.move(moving()) == {} and submaps.move(moving(f7=at(1))) == {}
+    assert (
+        submaps.positions.shape == (0, 3)
+        and submaps.apply_correction(moving()) == {}
+        and submaps.apply_correction(moving(f7=at(1))) == {}
+    )
 
 
 def test_a_submap_follows_its_middle_keyframe():
     submaps = three(4)
-    assert submaps.move(moving(f0=at(5.0))) == {}  # not the middle one
-    (moves,) = [submaps.move(moving(f10=at(1.5)))]
+    assert submaps.apply_correction(moving(f0=at(5.0))) == {}  # not the middle one
+    (moves,) = [submaps.apply_correction(moving(f10=at(1.5)))]
     assert list(moves) == [0] and np.allclose(moves[0], at(0.5))
     assert submaps.positions[:, 0].tolist() == [5.0, 1.5, 2.0, 3.0]
 
 
 def test_a_move_ends_the_submap_that_is_being_filled():
     submaps = three(2)
-    assert list(submaps.move(moving(f10=at(2.0)))) == [0]
-    assert submaps.enter(20, at(3)) == 1
+    assert list(submaps.apply_correction(moving(f10=at(2.0)))) == [0]
+    assert submaps.add_keyframe(20, at(3)) == 1
 
 
 def test_small_moves_add_up_until_they_are_made():
     submaps = three()
-    assert submaps.move(moving(f10=at(1.006))) == {}
-    assert list(submaps.move(moving(f10=at(1.012)))) == [0]
-    assert submaps.move(moving(f10=at(1.018))) == {}
+    assert submaps.apply_correction(moving(f10=at(1.006))) == {}
+    assert list(submaps.apply_correction(moving(f10=at(1.012)))) == [0]
+    assert submaps.apply_correction(moving(f10=at(1.018))) == {}
     assert np.allclose(submaps.world_from_fused[0], at(0.012))

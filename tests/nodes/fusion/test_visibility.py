@@ -2,18 +2,20 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from placegraph.nodes.fusion.visibility import Sight, SightConfig
+from placegraph.nodes.fusion.visibility import DepthVisibility, VisibilityConfig
 
 INTRINSICS = np.array([100.0, 100.0, 50.0, 40.0])
 NO_EDGES = np.zeros((80, 100), bool)
 
 
-def sight(depth_m, **settings):
-    return Sight(np.asarray(depth_m, np.float32), NO_EDGES, INTRINSICS, np.eye(4), SightConfig(**settings))
+def visibility(depth_m, **settings):
+    return DepthVisibility(
+        np.asarray(depth_m, np.float32), NO_EDGES, INTRINSICS, np.eye(4), VisibilityConfig(**settings)
+    )
 
 
 def judged(depth_m, point, **settings):
-    through, there = sight(depth_m, **settings).judge(np.array([point], float))
+    through, there = visibility(depth_m, **settings).classify(np.array([point], float))
     return "through" if through[0] else "there" if there[0] else "hidden"
 
 
@@ -44,12 +46,12 @@ def test_the_margin_grows_with_the_square_of_the_distance():
 
 def test_edges_are_not_believed():
     edges = np.ones((80, 100), bool)
-    one = Sight(np.full((80, 100), 2.0, np.float32), edges, INTRINSICS, np.eye(4), SightConfig())
-    assert [mask.any() for mask in one.judge(np.array([[0, 0, 2.0], [0, 0, 1.0]]))] == [False, False]
+    one = DepthVisibility(np.full((80, 100), 2.0, np.float32), edges, INTRINSICS, np.eye(4), VisibilityConfig())
+    assert [mask.any() for mask in one.classify(np.array([[0, 0, 2.0], [0, 0, 1.0]]))] == [False, False]
 
 
 def test_boxes_in_view_and_behind():
-    one = sight(np.full((80, 100), 2.0))
+    one = visibility(np.full((80, 100), 2.0))
     assert one.box_in_view(np.array([[-0.1, -0.1, 1.9], [0.1, 0.1, 2.1]]))
     assert not one.box_in_view(np.array([[-0.1, -0.1, -2.1], [0.1, 0.1, -1.9]]))
     assert not one.box_in_view(np.array([[5.0, -0.1, 1.9], [5.2, 0.1, 2.1]]))
@@ -58,4 +60,4 @@ def test_boxes_in_view_and_behind():
 @pytest.mark.parametrize("settings", [{"views": 0}, {"views": 256}, {"margin_m": 0.0}, {"through_share": 0.4}])
 def test_wrong_settings_are_refused(settings):
     with pytest.raises(ValidationError):
-        SightConfig(**settings)
+        VisibilityConfig(**settings)

@@ -1,21 +1,21 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.fusion.voxel_index import CellIndex, pack, sum_by_key, unpack
+from placegraph.nodes.fusion.voxel_index import VoxelIndex, sum_by_key, voxel_centers, voxel_keys
 from placegraph.runtime.errors import SchemaError
 
 VOXEL = np.full(3, 0.05)
 
 
-def test_pack_and_unpack_give_the_cell_centre():
+def test_the_center_of_a_points_voxel():
     xyz = np.array([[0.01, -0.01, 7.32], [-3.0, 0.05, -0.05]])
-    assert np.allclose(unpack(pack(xyz, 0.05), 0.05), [[0.025, -0.025, 7.325], [-2.975, 0.075, -0.025]])
+    assert np.allclose(voxel_centers(voxel_keys(xyz, 0.05), 0.05), [[0.025, -0.025, 7.325], [-2.975, 0.075, -0.025]])
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
-def test_points_that_cannot_be_packed_are_refused(bad):
+def test_points_without_a_voxel_key_are_refused(bad):
     with pytest.raises(SchemaError, match="not finite or more than"):
-        pack(np.array([[0.0, bad, 0.0]]), 0.05)
+        voxel_keys(np.array([[0.0, bad, 0.0]]), 0.05)
 
 
 def test_sum_by_key_of_nothing_and_of_shared_keys():
@@ -26,25 +26,25 @@ def test_sum_by_key_of_nothing_and_of_shared_keys():
 
 
 def test_a_cell_keeps_its_row_whatever_comes_later():
-    random, index = np.random.default_rng(0), CellIndex(VOXEL)
+    random, index = np.random.default_rng(0), VoxelIndex(VOXEL)
     rows: dict[int, int] = {}
     for _ in range(20):
-        keys = np.unique(pack(random.uniform(-5, 5, (200, 3)), 0.5))
+        keys = np.unique(voxel_keys(random.uniform(-5, 5, (200, 3)), 0.5))
         for key, row in zip(keys.tolist(), index.rows(keys).tolist(), strict=True):
             assert rows.setdefault(key, row) == row
     assert sorted(rows.values()) == list(range(len(index)))
     assert index.rows(np.zeros(0, np.int64)).shape == (0,)
 
 
-def test_near_gives_what_the_camera_may_see_and_not_what_is_behind_it():
-    index = CellIndex(VOXEL)
+def test_rows_in_frustum_are_what_the_camera_may_see_and_not_what_is_behind_it():
+    index = VoxelIndex(VOXEL)
     xyz = np.array([[x, 0.0, 1.0] for x in np.arange(-20, 20, 0.25)])
-    keys = np.unique(pack(xyz, 0.05))
+    keys = np.unique(voxel_keys(xyz, 0.05))
     at = dict(zip(keys.tolist(), index.rows(keys).tolist(), strict=True))
     camera_from_world = np.array(
         [[0, -1, 0, 0], [0, 0, -1, 1], [1, 0, 0, 0], [0, 0, 0, 1.0]]
     )  # looks along x from (0, 0, 1)
-    near = set(index.near(camera_from_world, (0.6, 0.5), 4.0).tolist())
-    seen = {at[key] for key, x in zip(pack(xyz, 0.05).tolist(), xyz[:, 0], strict=True) if 0.1 < x < 4}
-    assert seen <= near
-    assert len(near) < 2 * len(seen)  # blocks of 1.6 m
+    rows_in_frustum = set(index.rows_in_frustum(camera_from_world, (0.6, 0.5), 4.0).tolist())
+    seen = {at[key] for key, x in zip(voxel_keys(xyz, 0.05).tolist(), xyz[:, 0], strict=True) if 0.1 < x < 4}
+    assert seen <= rows_in_frustum
+    assert len(rows_in_frustum) < 2 * len(seen)  # blocks of 1.6 m

@@ -15,7 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from placegraph.nodes.hierarchy.rooms import RoomConfig, segment_rooms, walls_of_plan
+from placegraph.nodes.hierarchy.rooms import RoomConfig, keep_walls, segment_rooms
 
 TRUTH = "_truth_labels.png"
 TURNED = ("door_m", "neck_share", "seed_min_m", "smooth_m", "wall_min_m")  # those that a plan picture depends on
@@ -39,7 +39,7 @@ def f1(found: np.ndarray, truth: np.ndarray, wanted: float = 0.5) -> float:
 
 
 def ours(occupied: np.ndarray, config: RoomConfig) -> np.ndarray:
-    return segment_rooms(walls_of_plan(occupied, config), np.ones_like(occupied), config)
+    return segment_rooms(keep_walls(occupied, config), np.ones_like(occupied), config)
 
 
 def published(occupied: np.ndarray, config: RoomConfig) -> np.ndarray:

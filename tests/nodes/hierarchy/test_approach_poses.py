@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.hierarchy.approach_poses import Target, find_stand
-from placegraph.nodes.hierarchy.rooms import Grid
-from placegraph.nodes.hierarchy.traversability import LEVEL_M, Ground, TravelConfig
+from placegraph.nodes.hierarchy.approach_poses import ApproachTarget, find_approach
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.traversability import LEVEL_M, TraversabilityConfig, TraversabilityMap
 
-CONFIG = TravelConfig()
-GRID = Grid(np.array([-1.0, -2.0]), 0.05, (80, 80))  # 4 x 4 m
+CONFIG = TraversabilityConfig()
+GRID = PlanGrid(np.array([-1.0, -2.0]), 0.05, (80, 80))  # 4 x 4 m
 
 
 def middles():
@@ -21,7 +21,7 @@ def boxed(low, high):
 
 def target(low, high, z):
     footprint = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    return Target(footprint, np.array([*footprint.mean(axis=0), z]))
+    return ApproachTarget(footprint, np.array([*footprint.mean(axis=0), z]))
 
 
 def stand(thing, walls=(), here=None, reached=None, clearance=1.0):
@@ -32,8 +32,8 @@ def stand(thing, walls=(), here=None, reached=None, clearance=1.0):
         tops[boxed(low, high)] = round(height / LEVEL_M)
         free &= ~boxed(np.array(low) - 0.25, np.array(high) + 0.25)
     here = free if here is None else here & free
-    ground = Ground(GRID, 0.0, free, np.full(GRID.shape, clearance, np.float32), free, tops)
-    found = find_stand(thing, here, here if reached is None else reached, ground, CONFIG)
+    ground = TraversabilityMap(GRID, 0.0, free, np.full(GRID.shape, clearance, np.float32), free, tops)
+    found = find_approach(thing, here, here if reached is None else reached, ground, CONFIG)
     return found and (*middles()[found.cell], found.yaw_rad)
 
 

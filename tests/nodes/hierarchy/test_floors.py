@@ -5,10 +5,10 @@ import pytest
 
 from placegraph.nodes.hierarchy.floors import FloorConfig, find_floors
 
-NOBODY = np.zeros((0, 3))
+NO_CAMERAS = np.zeros((0, 3))
 
 
-def floors(points, cameras=NOBODY, **changes):
+def floors(points, cameras=NO_CAMERAS, **changes):
     return find_floors(np.asarray(points, float).reshape(-1, 3), np.asarray(cameras, float), FloorConfig(**changes))
 
 
@@ -22,7 +22,7 @@ def test_no_points_no_floor():
     assert floors([]) == []
 
 
-@pytest.mark.parametrize("cameras", [NOBODY, [[0, 0, 1.5]], [[0, 0, -9]]])
+@pytest.mark.parametrize("cameras", [NO_CAMERAS, [[0, 0, 1.5]], [[0, 0, -9]]])
 def test_one_point_is_a_floor(cameras):
     (span,) = floors([[1.0, 2, 3]], cameras)
     assert span.low == pytest.approx(3, abs=0.01) and span.high == pytest.approx(3, abs=0.01)

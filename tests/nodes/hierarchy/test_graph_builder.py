@@ -13,7 +13,7 @@ OBJECTS = {
     4: ("bed", (5.0, 0.5, 3.0), (7.0, 2.0, 3.5)),
     9: ("lamp", (1.0, 3.2, 3.0), (1.3, 3.5, 4.5)),
 }
-NOBODY = np.zeros((0, 3))
+EMPTY = np.zeros((0, 3))
 
 
 def build(*maps):
@@ -22,17 +22,17 @@ def build(*maps):
 
 
 def test_an_empty_map_is_a_building_alone(make_map):
-    assert list(build(make_map(NOBODY, NOBODY)).nodes) == ["B0"]
+    assert list(build(make_map(EMPTY, EMPTY)).nodes) == ["B0"]
 
 
 def test_one_point_is_a_floor_with_a_room(make_map):
-    graph = build(make_map(np.array([[1.0, 2, 3]]), NOBODY))
+    graph = build(make_map(np.array([[1.0, 2, 3]]), EMPTY))
     assert list(graph.nodes) == ["B0", "F0", "R0"]
     assert graph.nodes["R0"].parent == "F0" and graph.nodes["F0"].name == "floor 1" and graph.nodes["R0"].tags == ()
 
 
 def test_points_that_are_not_finite_are_refused(make_map):
-    world = make_map(np.zeros((4, 3)), NOBODY)
+    world = make_map(np.zeros((4, 3)), EMPTY)
     points = world.points_world.copy()
     points[2, 1] = np.nan
     with pytest.raises(SchemaError, match=r"Map 0: points_world\[2\] is not finite"):
@@ -40,7 +40,7 @@ def test_points_that_are_not_finite_are_refused(make_map):
 
 
 def test_an_object_without_points_is_refused(make_map):
-    world = make_map(np.zeros((4, 3)), NOBODY, {5: ("cup", (0, 0, 0), (0.1, 0.1, 0.1))})
+    world = make_map(np.zeros((4, 3)), EMPTY, {5: ("cup", (0, 0, 0), (0.1, 0.1, 0.1))})
     empty = dataclasses.replace(
         world, object_points_world=np.zeros((0, 3), np.float32), object_point_offsets=np.zeros(2, np.int64)
     )
@@ -136,9 +136,9 @@ def test_what_is_remembered_makes_no_difference(make_map, house_points, walk):
     maps = growing_maps(make_map, house_points, walk)
     remembering, forgetting = GraphBuilder(LayerConfig()), GraphBuilder(LayerConfig())
     for world in maps:
-        for known in (forgetting._known_rooms, forgetting._known_locations, forgetting._known_footprints):
-            known.turn()
-            known.turn()
+        for memo in (forgetting._room_memo, forgetting._location_memo, forgetting._footprint_memo):
+            memo.end_build()
+            memo.end_build()
         assert remembering.build(world).to_json() == forgetting.build(world).to_json()
 
 

@@ -1,22 +1,22 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.hierarchy.memo import Unchanged, digest
+from placegraph.nodes.hierarchy.memo import Memo, digest
 
 
 def test_made_once_while_it_is_asked_for_and_forgotten_after_a_build_without_it():
     made: list[str] = []
-    known: Unchanged[str] = Unchanged()
+    known: Memo[str] = Memo()
 
     def ask(name):
         return known.get(name.encode(), lambda: made.append(name) or f"{name}{len(made)}")
 
     assert [ask("a"), ask("a")] == ["a1", "a1"]
-    known.turn()
+    known.end_build()
     assert [ask("a"), ask("b")] == ["a1", "b2"]
-    known.turn()
+    known.end_build()
     assert ask("b") == "b2"
-    known.turn()
+    known.end_build()
     assert ask("a") == "a3"
 
 

@@ -2,26 +2,27 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.object_rooms import HomeRoom, find_homes
-from placegraph.nodes.hierarchy.rooms import Grid, RoomArea
+from placegraph.nodes.hierarchy.object_rooms import FloorRoom, assign_rooms
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.rooms import RoomArea
 
 
 def room(name, floor, columns, low):
     mask = np.zeros((10, 20), bool)
     mask[:, columns] = True
     span = FloorSpan(low, low + 2.6, low - 0.1, low + 2.8)
-    return HomeRoom(name, floor, span, Grid(np.zeros(2), 0.5, mask.shape), RoomArea(mask, np.zeros((0, 2))))
+    return FloorRoom(name, floor, span, PlanGrid(np.zeros(2), 0.5, mask.shape), RoomArea(mask, np.zeros((0, 2))))
 
 
 ROOMS = [room(f"R{2 * f + k}", f"F{f}", slice(8 * k, 8 * k + 8), 3.0 * f) for f in range(2) for k in range(2)]
 
 
 def homes(*objects):
-    return [home.id for home in find_homes([np.array(xyz, float) for xyz in objects], ROOMS)]
+    return [home.id for home in assign_rooms([np.array(xyz, float) for xyz in objects], ROOMS)]
 
 
 def test_no_objects_and_no_rooms():
-    assert find_homes([], []) == []
+    assert assign_rooms([], []) == []
 
 
 @pytest.mark.parametrize(

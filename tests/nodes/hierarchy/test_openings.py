@@ -2,19 +2,21 @@ import cv2
 import numpy as np
 import pytest
 
-from placegraph.nodes.hierarchy.openings import NOBODY, find_openings, owners
-from placegraph.nodes.hierarchy.rooms import Grid
-from placegraph.nodes.hierarchy.traversability import Ground, TravelConfig
+from placegraph.nodes.hierarchy.openings import NO_ROOM, find_openings, grow_rooms
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.traversability import TraversabilityConfig, TraversabilityMap
 
-CONFIG = TravelConfig()
+CONFIG = TraversabilityConfig()
 SHAPE = (60, 120)  # 3 x 6 m
 
 
 def ground(passable):
     clearance = cv2.distanceTransform(np.pad(passable, 1).astype(np.uint8), cv2.DIST_L2, 0)[1:-1, 1:-1] * 0.05 - 0.025
     clearance[~passable] = 0
-    standing = clearance >= CONFIG.robot_radius_m
-    return Ground(Grid(np.zeros(2), 0.05, SHAPE), 0.0, passable, clearance, standing, np.zeros(SHAPE, np.uint8))
+    standable = clearance >= CONFIG.robot_radius_m
+    return TraversabilityMap(
+        PlanGrid(np.zeros(2), 0.05, SHAPE), 0.0, passable, clearance, standable, np.zeros(SHAPE, np.uint8)
+    )
 
 
 def two_rooms(*doors):
@@ -29,13 +31,13 @@ def two_rooms(*doors):
 
 def openings(masks, passable):
     here = ground(passable)
-    return find_openings(owners(masks, here, CONFIG), here, CONFIG)
+    return find_openings(grow_rooms(masks, here, CONFIG), here, CONFIG)
 
 
 def test_nothing_is_passable():
     masks, _ = two_rooms()
     assert openings(masks, np.zeros(SHAPE, bool)) == []
-    assert (owners(masks, ground(np.zeros(SHAPE, bool)), CONFIG) == NOBODY).all()
+    assert (grow_rooms(masks, ground(np.zeros(SHAPE, bool)), CONFIG) == NO_ROOM).all()
 
 
 @pytest.mark.parametrize(("doors", "found"), [((), 0), (((20, 38),), 1), (((20, 26),), 0), (((4, 22), (30, 48)), 2)])
@@ -47,7 +49,7 @@ def test_each_gap_wide_enough_for_the_robot_is_an_opening(doors, found):
         assert one.width_m == pytest.approx((high - low) * 0.05, abs=0.06)
 
 
-def test_no_opening_into_a_room_without_standing_room():
+def test_no_opening_into_a_room_without_standable_room():
     masks, passable = two_rooms((20, 38))
     passable[:, 66:] = False
     assert openings(masks, passable) == []

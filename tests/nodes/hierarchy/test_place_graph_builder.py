@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.hierarchy.graph_builder import GraphBuilder, LayerConfig
-from placegraph.nodes.hierarchy.traversability import TravelConfig
+from placegraph.nodes.hierarchy.traversability import TraversabilityConfig
 from placegraph.runtime.scene_graph.route import find_route
 
 STEP = 0.05
@@ -42,8 +42,8 @@ def row(rooms, doors, base=0.0):
     return np.concatenate(parts), np.concatenate(free)
 
 
-def build(*maps, travel=None):
-    builder = GraphBuilder(LayerConfig(travel=travel or TravelConfig()))
+def build(*maps, traversability=None):
+    builder = GraphBuilder(LayerConfig(traversability=traversability or TraversabilityConfig()))
     return [builder.build(world) for world in maps][-1]
 
 
@@ -81,8 +81,8 @@ def test_a_closed_door_and_one_too_narrow_for_the_robot_join_nothing(make_map, d
 def test_a_small_robot_passes_where_a_large_one_does_not(make_map):
     points, free = row(2, [(1.7, 2.3)])
     world = make_map(points, WEST, free=free)
-    assert len(build(world, travel=TravelConfig(robot_radius_m=0.15)).connections) == 1
-    assert not build(world, travel=TravelConfig(robot_radius_m=0.4)).connections
+    assert len(build(world, traversability=TraversabilityConfig(robot_radius_m=0.15)).connections) == 1
+    assert not build(world, traversability=TraversabilityConfig(robot_radius_m=0.4)).connections
 
 
 def test_what_was_not_seen_to_be_free_is_not_passable(make_map):
@@ -175,7 +175,7 @@ def test_ids_stay_and_unchanged_rooms_are_not_computed_again(make_map, monkeypat
     builder = GraphBuilder(LayerConfig())
     whole = make_map(points, WEST, {1: ("ball", (6, 2, 0), (6.3, 2.3, 0.3))}, free=free)
     before = builder.build(whole).to_json()
-    for name in ("reach_from", "find_ground", "find_openings", "find_stand"):
+    for name in ("shortest_paths", "compute_traversability", "find_openings", "find_approach"):
         monkeypatch.setattr(f"placegraph.nodes.hierarchy.place_graph_builder.{name}", None)  # calling it would fail
     assert builder.build(whole).to_json() == before
 

@@ -2,16 +2,15 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid, floor_grid
 from placegraph.nodes.hierarchy.rooms import (
-    Grid,
     RoomConfig,
     distance_field,
     find_rooms,
-    floor_grid,
+    keep_walls,
     observed_mask,
     segment_rooms,
     wall_mask,
-    walls_of_plan,
 )
 
 CONFIG = RoomConfig()
@@ -125,7 +124,7 @@ def test_distance_field_is_in_metres():
 
 
 def test_walls_are_what_fills_the_slice_not_what_has_many_points():
-    grid = Grid(np.zeros(2), 0.05, (60, 60))
+    grid = PlanGrid(np.zeros(2), 0.05, (60, 60))
     y, z = (side.ravel() for side in np.meshgrid(np.arange(0.5, 2, 0.05), np.arange(0, 2.6, 0.05)))
     wall = np.stack((np.full(y.size, 0.525), y, z), axis=1)
     shelf = np.repeat(np.stack((np.full(30, 1.525), np.arange(0.5, 2, 0.05), np.full(30, 1.85)), axis=1), 50, axis=0)
@@ -144,7 +143,7 @@ def test_a_lintel_parts_rooms_and_a_lamp_as_high_does_not(width, rooms):
 
 
 def test_no_tall_points_no_walls():
-    grid = Grid(np.zeros(2), 0.05, (10, 10))
+    grid = PlanGrid(np.zeros(2), 0.05, (10, 10))
     assert not wall_mask(np.zeros((3, 3)), SPAN, grid, CONFIG).any()
     assert not wall_mask(np.zeros((3, 3)), FloorSpan(0.0, 0.0, 0.0, 0.0), grid, CONFIG).any()
 
@@ -160,16 +159,16 @@ def test_gaps_in_the_observed_area_are_closed_also_at_the_border():
 def test_outline_of_a_rectangle_is_exact():
     mask = np.zeros((20, 30), bool)
     mask[5:15, 10:25] = True
-    outline = Grid(np.array([1.0, 2.0]), 0.1, (20, 30)).outline(mask)
+    outline = PlanGrid(np.array([1.0, 2.0]), 0.1, (20, 30)).outline(mask)
     assert outline.min(axis=0) == pytest.approx((2.0, 2.5), abs=0.06)
     assert outline.max(axis=0) == pytest.approx((3.5, 3.5), abs=0.06)
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_walls_of_a_plan_are_its_walls_of_plan(count: int) -> None:
+def test_pieces_shorter_than_a_wall_are_no_walls(count: int) -> None:
     occupied = np.zeros((60, 60), bool)
-    assert not walls_of_plan(occupied, CONFIG).any()
+    assert not keep_walls(occupied, CONFIG).any()
     occupied[5, 5 : 5 + 40 * count] = True  # two metres of wall
     occupied[30:40, 30:40] = True  # half a metre of table
-    walls = walls_of_plan(occupied, CONFIG)
+    walls = keep_walls(occupied, CONFIG)
     assert walls.sum() == 40 * count and not walls[30:40, 30:40].any()

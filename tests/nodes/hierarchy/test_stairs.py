@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan
-from placegraph.nodes.hierarchy.stairs import CLIMBING, find_stairs, floors_stood_on, steps_on
-from placegraph.nodes.hierarchy.traversability import TravelConfig
+from placegraph.nodes.hierarchy.stairs import NO_FLOOR, find_stairs, path_segments_on, standing_floors
+from placegraph.nodes.hierarchy.traversability import TraversabilityConfig
 
 SPANS = [FloorSpan(0.0, 2.6, -0.1, 2.9), FloorSpan(3.0, 5.6, 2.9, 6.0)]
-CONFIG = TravelConfig()
+CONFIG = TraversabilityConfig()
 BELOW = np.array([(x, 0, 1.4) for x in np.linspace(-3, 0, 13)])
 CLIMB = np.array([(0.25 * i, 0, 1.4 + 0.25 * i) for i in range(1, 12)])
 ABOVE = np.array([(x, 0, 4.4) for x in np.linspace(3, 6, 13)])
@@ -14,20 +14,20 @@ NOTHING = np.zeros((0, 3))
 
 
 def stairs_of(path, points=NOTHING, spans=SPANS):
-    standing = floors_stood_on(path, spans, FloorConfig(), CONFIG)
+    standing = standing_floors(path, spans, FloorConfig(), CONFIG)
     return find_stairs(path, standing, spans, points, CONFIG)
 
 
 def test_no_camera_or_no_floor():
     assert stairs_of(NOTHING) == [] and stairs_of(ABOVE, spans=[]) == []
-    assert len(steps_on(0, NOTHING, np.zeros(0, np.int64), CONFIG)) == 0
+    assert len(path_segments_on(0, NOTHING, np.zeros(0, np.int64), CONFIG)) == 0
 
 
 def test_standing_is_being_at_the_usual_height():
     path = np.concatenate((BELOW, CLIMB, ABOVE))
-    standing = floors_stood_on(path, SPANS, FloorConfig(), CONFIG)
-    assert standing.tolist() == [0] * 13 + [CLIMBING] * 11 + [1] * 13
-    assert len(steps_on(0, path, standing, CONFIG)) == 12
+    standing = standing_floors(path, SPANS, FloorConfig(), CONFIG)
+    assert standing.tolist() == [0] * 13 + [NO_FLOOR] * 11 + [1] * 13
+    assert len(path_segments_on(0, path, standing, CONFIG)) == 12
 
 
 @pytest.mark.parametrize("down", [False, True])

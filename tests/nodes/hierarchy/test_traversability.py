@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.rooms import Grid
-from placegraph.nodes.hierarchy.traversability import TravelConfig, deep_points, find_ground
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.traversability import TraversabilityConfig, compute_traversability, drop_off_points
 
-GRID = Grid(np.zeros(2), 0.05, (80, 80))  # 4 x 4 m
+GRID = PlanGrid(np.zeros(2), 0.05, (80, 80))  # 4 x 4 m
 SPAN = FloorSpan(0.0, 2.6, -0.1, 2.9)
 NOTHING = np.zeros((0, 3))
 PATH = np.zeros((0, 2, 3))
@@ -21,9 +21,9 @@ FREE = spread((0.5, 3.5), (0.5, 3.5), 0.75, 0.1)
 
 
 def ground(points=FLOOR, free=FREE, path=PATH, below=NOTHING, **settings):
-    config = TravelConfig(**settings)
-    deep = deep_points(below, SPAN, config)
-    return find_ground(points, deep, free, 0.1, np.asarray(path, float), GRID, SPAN, config)
+    config = TraversabilityConfig(**settings)
+    deep = drop_off_points(below, SPAN, config)
+    return compute_traversability(points, deep, free, 0.1, np.asarray(path, float), GRID, SPAN, config)
 
 
 def at(image, x, y):
@@ -32,8 +32,8 @@ def at(image, x, y):
 
 def test_floor_seen_through_free_space_is_passable_and_nothing_else():
     made = ground()
-    assert at(made.passable, 2, 2) and at(made.standing, 2, 2) and not at(made.passable, 0.2, 2)
-    assert at(made.passable, 0.6, 2) and not at(made.standing, 0.6, 2)
+    assert at(made.passable, 2, 2) and at(made.standable, 2, 2) and not at(made.passable, 0.2, 2)
+    assert at(made.passable, 0.6, 2) and not at(made.standable, 0.6, 2)
     assert at(made.clearance_m, 2.0, 0.62) == pytest.approx(0.12, abs=0.06)
 
 
@@ -63,7 +63,7 @@ def test_the_noise_before_a_wall_is_no_obstacle_and_a_low_thing_before_it_is():
 
 def test_where_the_camera_went_the_robot_may_stand_whatever_was_seen():
     made = ground(NOTHING, NOTHING, [((1, 1, 1.4), (2, 1, 1.4))])
-    assert at(made.standing, 1.5, 1) and at(made.passable, 1.5, 1.2) and not at(made.passable, 1.5, 1.4)
+    assert at(made.standable, 1.5, 1) and at(made.passable, 1.5, 1.2) and not at(made.passable, 1.5, 1.4)
 
 
 def test_the_blind_spot_below_the_camera_is_floor_unless_the_ground_falls_away():
@@ -75,8 +75,8 @@ def test_the_blind_spot_below_the_camera_is_floor_unless_the_ground_falls_away()
     assert at(ground(hole, path=beside, below=spread((1.5, 2.5), (1.5, 2.5), -2.5)).passable, 2, 2)
 
 
-def test_tops_are_those_of_the_highest_below_the_robot_s_height():
+def test_obstacle_levels_are_those_of_the_highest_point_below_the_robot_s_height():
     post = np.array([(2.025, 2.025, z) for z in np.arange(0.2, 0.93, 0.05)])
     lamp = np.array([(1.025, 1.025, z) for z in np.arange(1.8, 2.0, 0.05)])
-    tops = ground(np.concatenate((FLOOR, post, lamp))).tops
+    tops = ground(np.concatenate((FLOOR, post, lamp))).obstacle_levels
     assert at(tops, 2.025, 2.025) == 9 and at(tops, 1.025, 1.025) == 0

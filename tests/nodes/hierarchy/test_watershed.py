@@ -1,19 +1,19 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.hierarchy.watershed import flood
+from placegraph.nodes.hierarchy.watershed import watershed
 
 WIDE = [[3, 3, 1, 2, 2, 2]]  # two basins and the neck between them
 
 
 def flooded(field, parts=lambda neck: True, space=None):
     field = np.array(field, np.float32)
-    return flood(field, field > 0 if space is None else np.array(space, bool), 1.0, 0.5, parts).tolist()
+    return watershed(field, field > 0 if space is None else np.array(space, bool), 1.0, 0.5, parts).tolist()
 
 
 @pytest.mark.parametrize("shape", [(0, 0), (1, 1), (3, 0)])
-def test_nothing_to_flood(shape):
-    assert flood(np.zeros(shape, np.float32), np.zeros(shape, bool), 1.0, 0.5, lambda neck: True).shape == shape
+def test_no_cells_at_all(shape):
+    assert watershed(np.zeros(shape, np.float32), np.zeros(shape, bool), 1.0, 0.5, lambda neck: True).shape == shape
 
 
 def test_one_cell_is_a_basin():
@@ -29,7 +29,7 @@ def test_two_basins_stay_apart_or_join_as_their_neck_decides():
 
     assert flooded(WIDE, keep) == [[1, 1, 2, 2, 2, 2]]  # the later basin wins a tie
     (neck,) = asked
-    assert neck.level == 1 and sorted(neck.heights) == [2, 3] and neck.cell in ((0, 1), (0, 2))
+    assert neck.level == 1 and sorted(neck.seed_levels) == [2, 3] and neck.cell in ((0, 1), (0, 2))
     assert flooded(WIDE, lambda neck: False) == [[1] * 6]
 
 
