@@ -12,8 +12,8 @@ import typer
 from placegraph.runtime.bus.session import Bus, BusConfig
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.query.request import make_question
-from placegraph.tools.answerer import Answerer
-from placegraph.tools.batch import Batch, answer_all
+from placegraph.tools.query.offline_query import OfflineQuery
+from placegraph.tools.query.question_file import Batch, answer_all
 
 NOT_FOUND = 3
 
@@ -59,7 +59,7 @@ def ask(
         with Bus(BusConfig(endpoint=endpoint, prefix=prefix)) as bus:
             reply = json.loads(bus.ask(json.dumps(request).encode(), timeout_s, "ask"))
     else:
-        with Answerer() as answerer:
+        with OfflineQuery() as answerer:
             reply = answerer.ask(Path(where), question)
     print(json.dumps(reply, sort_keys=True) if as_json else _in_words(reply))
     if reply["status"] != "found":
@@ -68,7 +68,7 @@ def ask(
 
 def _ask_all(questions: Path, out: Path, graph: Path | None, k: int, mode: str) -> None:
     make_question("-", k=k, mode=mode)  # a wrong option is no fault of every line
-    with Answerer() as answerer:
+    with OfflineQuery() as answerer:
         if graph is not None:
             answerer.check(graph)
         tally = answer_all(Batch(answerer, questions.parent, graph, k=k, mode=mode), questions, out)

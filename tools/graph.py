@@ -11,7 +11,7 @@ from placegraph.runtime.messages import Message
 from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import NODES, Node, available, plugin
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import find_graph
 
 
 def graph(

@@ -13,7 +13,7 @@ from placegraph.runtime.errors import QueryError
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import rounded
 from placegraph.runtime.scene_graph.route import Route, find_route
-from placegraph.tools.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import find_graph
 
 LAYERS = ("room", "location", "object")  # a name is looked for in this order
 

@@ -16,7 +16,7 @@ from placegraph.runtime.errors import ConfigError, SchemaError, SourceError
 from placegraph.runtime.messages.codec import decode
 from placegraph.runtime.node import build_node
 from placegraph.runtime.process import ProcessSpec
-from placegraph.tools.map_folder import RUN, read_config
+from placegraph.tools.map_files.map_folder import RUN, read_config
 from placegraph.tools.run import run_dataflow
 
 BEFORE_KEYFRAMES = ("camera", "pose", "keyframe")

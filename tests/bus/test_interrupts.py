@@ -16,7 +16,7 @@ from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.config import RunConfig, build
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.inline import Inline
-from placegraph.tools.map_folder import GRAPH, Collector
+from placegraph.tools.map_files.map_folder import GRAPH, Collector
 from placegraph.tools.run import _keep, run_dataflow
 
 NODES = """[nodes.camera]

@@ -7,8 +7,8 @@ import pytest
 
 from placegraph.runtime.node import NODES, available
 from placegraph.tools.graph import node_types
-from placegraph.tools.recorded_steps import Reference, differences, summary
 from placegraph.tools.references import LEFT_OUT, RECORDING, SUMMARY
+from placegraph.tools.references.recorded_steps import Reference, differences, summary
 
 HERE = Path(__file__).parent
 CONSUMERS = sorted(name for name, kind in node_types().items() if kind.inputs)

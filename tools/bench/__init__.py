@@ -26,8 +26,8 @@ from placegraph.runtime.messages import Keyframe
 from placegraph.runtime.messages.codec import decode, encode
 from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.recording import RecordingWriter
-from placegraph.tools.bench.contract import fuzz
-from placegraph.tools.bench.growth import Sample, drawing, grow, p95_by_floor
+from placegraph.tools.bench.map_growth import Sample, drawing, grow, p95_by_floor
+from placegraph.tools.bench.reply_contract import fuzz
 
 IMAGE = {"width": 640, "height": 480}  # what an OAK-D gives
 REPEATS = 30

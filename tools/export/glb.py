@@ -9,7 +9,7 @@ import numpy as np
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.map_folder import read_cloud
+from placegraph.tools.map_files.map_folder import read_cloud
 
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # glTF's up is +y, ours +z
 ALPHA = 110  # of 255: the cloud shows through the boxes

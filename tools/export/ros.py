@@ -14,7 +14,7 @@ from placegraph.nodes.hierarchy.rooms import Grid, floor_grid
 from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.map_folder import prepare, read_cloud
+from placegraph.tools.map_files.map_folder import prepare, read_cloud
 
 CELL_M = 0.05
 CLEAR_M, TALL_M = 0.12, 1.6  # above the floor: noise of the floor itself below, lamps and lintels above
