@@ -1,7 +1,7 @@
-"""Requests that nobody should send, and real ones between them: does each get a reply that keeps the contract?
+"""Hostile and broken requests, with real ones between them.
 
 Everything follows from the seed: random bytes and letters, other languages, attempts to steer the language model, ids
-that do not exist, wrong types, and requests about a house, whole or with words lost and swapped.
+that do not exist, wrong types, and requests about a house, whole or with words removed and swapped.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ STEERING = (
 )  # fmt: skip
 ABSENT_IDS = ("O999", "O99999999999999999999", "R77", "F9", "L5", "B0", "B1", "C0", "O01", "o0", "O-1", "X1", "O1.5")
 EMOJI = "🪑🛋️🛏️🚪🪟👩‍👩‍👧🇫🇮❤️‍🔥💡"
-WRONG: tuple[Any, ...] = (
+WRONG_VALUES: tuple[Any, ...] = (
     None, True, False, 0, -1, 1.5, 51, 10**30, 10**400, float("nan"), float("inf"), "", " ", "\x00", "\ud800",
     "x" * 200, [], [[]], [1], [1, 2], [1, 2, 3, 4, 5], [1, 2, None], [1, 2, True], [1, 2, "3"], [1, 2, 1e308], {},
     {"x": 1}, "rules ",
 )  # fmt: skip
 
-Draw = Callable[[np.random.Generator, Sequence[str]], bytes]
+RequestMaker = Callable[[np.random.Generator, Sequence[str]], bytes]
 
 
 def requests(texts: Sequence[str], count: int, seed: int) -> Iterator[tuple[str, bytes]]:
@@ -58,7 +58,7 @@ def _pick(random: np.random.Generator, options: Sequence[Any]) -> Any:
 
 
 def _request(random: np.random.Generator, text: str) -> bytes:
-    """A request in due form, but for its text."""
+    """A well-formed request with any text."""
     fields: dict[str, Any] = {"text": text}
     if random.random() < 0.3:
         fields["pose"] = np.round(random.uniform(-20, 20, int(random.integers(3, 5))), 3).tolist()
@@ -90,8 +90,8 @@ def _steering(random: np.random.Generator, texts: Sequence[str]) -> bytes:
 
 
 def _absent(random: np.random.Generator, texts: Sequence[str]) -> bytes:
-    one, two = _pick(random, ABSENT_IDS), _pick(random, ABSENT_IDS)
-    forms = (one, f"where is {one}", f"the chair near {one}", f"{one} between {two} and the bed", f"the lamp in {one}")
+    a, b = _pick(random, ABSENT_IDS), _pick(random, ABSENT_IDS)
+    forms = (a, f"where is {a}", f"the chair near {a}", f"{a} between {b} and the bed", f"the lamp in {a}")
     return _request(random, _pick(random, forms))
 
 
@@ -117,7 +117,7 @@ def _mutated(random: np.random.Generator, texts: Sequence[str]) -> bytes:
 def _wrong(random: np.random.Generator, texts: Sequence[str]) -> bytes:
     fields: dict[str, Any] = {"text": _pick(random, texts)}
     for _ in range(int(random.integers(1, 3))):
-        fields[_pick(random, (*FIELDS, "viewpoint", "txt", ""))] = _pick(random, WRONG)
+        fields[_pick(random, (*FIELDS, "viewpoint", "txt", ""))] = _pick(random, WRONG_VALUES)
     return json.dumps(fields).encode()
 
 
@@ -131,7 +131,7 @@ def _cut(random: np.random.Generator, texts: Sequence[str]) -> bytes:
 
 
 def _mutation(random: np.random.Generator, text: str) -> str:
-    """One to three words lost, said twice, swapped or misspelt."""
+    """One to three words removed, repeated, swapped or misspelt."""
     words = text.split()
     for _ in range(int(random.integers(1, 4))):
         if len(words) < 2:
@@ -150,7 +150,7 @@ def _mutation(random: np.random.Generator, text: str) -> str:
     return " ".join(words)
 
 
-KINDS: dict[str, Draw] = {
+KINDS: dict[str, RequestMaker] = {
     "noise": _noise,
     "letters": _letters,
     "foreign": _foreign,

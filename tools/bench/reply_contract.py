@@ -1,4 +1,4 @@
-"""Whether replies keep their contract, whatever was asked: each fits its schema and names only what the graph holds."""
+"""Whether replies keep their contract under hostile requests: each fits its schema and names only ids of the graph."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from placegraph.tools.simulator.listing import object_list
 from placegraph.tools.simulator.questions import questions
 
 NODE_ID = re.compile(r"\b[BFRLOC][0-9]+\b")
-TIMEOUT_S = 600.0  # nobody waits: what takes long is seen in the times
-SHOWN_FAULTS = 20
+TIMEOUT_S = 600.0  # of the query server: long enough that slow replies show in the times and not as timeouts
+MAX_SHOWN_FAULTS = 20
 
 
 @dataclass
-class Outcome:
-    """What became of the requests: how many replies of each kind of request had which status, times, and faults."""
+class FuzzOutcome:
+    """Replies by kind of request and status, their times, and the faults found in them."""
 
     statuses: Counter[tuple[str, str]] = field(default_factory=Counter)
     ms: list[float] = field(default_factory=list)
@@ -42,7 +42,7 @@ class Outcome:
     grown_mb: float = 0.0  # memory of the process, from the first tenth of the requests to the last
 
     def document(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The outcome for JSON."""
         kinds: dict[str, dict[str, int]] = {}
         for (kind, status), count in sorted(self.statuses.items()):
             kinds.setdefault(kind, {})[status] = count
@@ -51,15 +51,15 @@ class Outcome:
         return {
             "requests": len(self.ms),
             "faults": len(self.faults),
-            "first_faults": self.faults[:SHOWN_FAULTS],
+            "first_faults": self.faults[:MAX_SHOWN_FAULTS],
             "replies": kinds,
             "ms": times,
             "grown_mb": round(self.grown_mb, 1),
         }
 
 
-class _Asker:
-    """Stands where the bus's Request stands: a payload, and the replies to it."""
+class _FakeRequest:
+    """Takes the place of the bus's Request: a payload, and the replies to it."""
 
     def __init__(self, payload: bytes) -> None:
         self.payload = payload
@@ -69,25 +69,25 @@ class _Asker:
         self.replies.append(payload)
 
 
-def fuzz(count: int, *, mode: str, seed: int, floors: int = 2, settings: dict[str, Any] | None = None) -> Outcome:
-    """Put `count` seeded requests to the question desk and the grounding node, in this process; mode: of all of them.
+def fuzz(count: int, *, mode: str, seed: int, floors: int = 2, settings: dict[str, Any] | None = None) -> FuzzOutcome:
+    """Put `count` seeded requests to the query server and the grounding node, in this process, all with one `mode`.
 
-    The map is that of a generated house with so many floors, as an object list. settings: of the grounding node.
+    The map is an object list of a simulated house with so many floors. settings: of the grounding node.
     """
     house = build(seed, floors)
     graph = scene_of(read_listed(object_list(house), f"house {seed}"), f"house {seed}").graph
     texts = [question.text for question in questions(house, seed)]
-    outcome, process = Outcome(), psutil.Process()
+    outcome, process = FuzzOutcome(), psutil.Process()
     with _running(graph, settings or {}) as node:
         for number, (kind, payload) in enumerate(requests(texts, count, seed)):
-            asker, faults = _Asker(payload), []
+            request, faults = _FakeRequest(payload), []
             try:
-                _put(node, asker, mode)
-            except Exception as error:  # the node would have ended
+                _put(node, request, mode)
+            except Exception as error:  # it would have ended the node's process
                 faults.append(f"{type(error).__name__}: {error}")
-            status, more = _judged(asker.replies, graph, outcome)
+            status, reply_faults = _check(request.replies, graph, outcome)
             outcome.statuses[kind, status] += 1
-            outcome.faults += [f"{kind} {payload[:300]!r}: {fault}" for fault in faults + more]
+            outcome.faults += [f"{kind} {payload[:300]!r}: {fault}" for fault in faults + reply_faults]
             if number == count // 10:
                 outcome.grown_mb = -process.memory_info().rss / 1e6
     outcome.grown_mb += process.memory_info().rss / 1e6
@@ -105,25 +105,25 @@ def _running(graph: SceneGraph, settings: dict[str, Any]) -> Iterator[Node]:
         node.stop()
 
 
-def _put(node: Node, asker: _Asker, mode: str) -> None:
-    """A request's way in a running system, without the bus: desk, message on the wire, node, desk."""
+def _put(node: Node, request: _FakeRequest, mode: str) -> None:
+    """The path of a request in a running system, without the bus: server, encoded message, node, server."""
 
     def forward(number: int, question: Question) -> None:
-        asked = decode(Question, encode(replace(question, mode=mode)))
-        answers = [message for message in node.step(asked) if isinstance(message, Answer)]
+        received = decode(Question, encode(replace(question, mode=mode)))
+        answers = [message for message in node.step(received) if isinstance(message, Answer)]
         if len(answers) != 1:
             raise PlacegraphError(f"{len(answers)} answers from the node")
-        desk.answer(number, decode(Answer, encode(answers[0])).json)
+        server.answer(number, decode(Answer, encode(answers[0])).json)
 
-    desk = QueryServer(forward, TIMEOUT_S)
+    server = QueryServer(forward, TIMEOUT_S)
     try:
-        desk.take(asker)  # type: ignore[arg-type]  # of the bus's Request it needs what the asker has
+        server.take(request)  # type: ignore[arg-type]
     finally:
-        desk.close("the node failed")
+        server.close("the node failed")
 
 
-def _judged(replies: list[bytes], graph: SceneGraph, outcome: Outcome) -> tuple[str, list[str]]:
-    """The reply's status, and what is wrong with it."""
+def _check(replies: list[bytes], graph: SceneGraph, outcome: FuzzOutcome) -> tuple[str, list[str]]:
+    """The reply's status, and its faults."""
     if len(replies) != 1:
         return "none", [f"{len(replies)} replies"]
     try:
@@ -131,10 +131,10 @@ def _judged(replies: list[bytes], graph: SceneGraph, outcome: Outcome) -> tuple[
     except ValidationError as error:
         return "invalid", [f"{replies[0][:300]!r}: {error.errors(include_url=False)[0]}"]
     outcome.ms.append(reply.ms)
-    known = {*graph.nodes, *graph.connections}
-    ids = {reply.object_id, *reply.route, *(step.id for step in reply.path), *(one.id for one in reply.candidates)}
-    sentences = [*reply.evidence, *(sentence for one in reply.candidates for sentence in one.evidence)]
-    said = set(NODE_ID.findall(reply.question.upper()))  # an id of the asker may be told to be nowhere
-    ids |= {found for sentence in sentences for found in NODE_ID.findall(sentence) if found not in said}
-    strange = sorted(node_id for node_id in ids if node_id is not None and node_id not in known)
-    return reply.status, [f"ids that are not in the graph: {strange}"] if strange else []
+    known_ids = {*graph.nodes, *graph.connections}
+    ids = {reply.object_id, *reply.route, *(step.id for step in reply.path), *(thing.id for thing in reply.candidates)}
+    sentences = [*reply.evidence, *(sentence for thing in reply.candidates for sentence in thing.evidence)]
+    asked_ids = set(NODE_ID.findall(reply.question.upper()))  # the evidence may say that these do not exist
+    ids |= {node_id for sentence in sentences for node_id in NODE_ID.findall(sentence) if node_id not in asked_ids}
+    unknown = sorted(node_id for node_id in ids if node_id is not None and node_id not in known_ids)
+    return reply.status, [f"ids that are not in the graph: {unknown}"] if unknown else []

@@ -30,7 +30,8 @@ from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.evaluate.aligned_map import read_aligned_map
 from placegraph.tools.evaluate.grounding_scores import QuestionResult, eye_in_map, read_questions
 from placegraph.tools.evaluate.trajectory_error import level_alignment, paired
-from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph, read_trajectory
+from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph
+from placegraph.tools.map_files.trajectory_file import read_trajectory
 from placegraph.tools.simulator.build import build
 from placegraph.tools.simulator.questions import AskedQuestion, questions
 from placegraph.tools.simulator.true_graph import true_graph

@@ -26,7 +26,8 @@ from placegraph.tools.evaluate.grounding_scores import ask_all, grounding_scores
 from placegraph.tools.evaluate.layer_scores import map_scores
 from placegraph.tools.evaluate.place_name_scores import place_name_scores
 from placegraph.tools.evaluate.trajectory_error import level_alignment, paired
-from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph, read_trajectory
+from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph
+from placegraph.tools.map_files.trajectory_file import read_trajectory
 from placegraph.tools.simulator.classes import CLASSES
 from placegraph.tools.simulator.space import inside
 from placegraph.tools.simulator.truth import Seen, TrueLocation, Truth, read_truth

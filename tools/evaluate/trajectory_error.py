@@ -10,7 +10,7 @@ import numpy as np
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.vision.geometry import pose_from_quaternion
-from placegraph.tools.map_files.map_folder import read_trajectory
+from placegraph.tools.map_files.trajectory_file import read_trajectory
 
 RPE_M = 1.0  # of given path between the two poses of a pair
 MAX_TIME_DIFFERENCE_NS = 20_000_000  # between poses that belong together; 0.02 s as in the tools of TUM RGB-D

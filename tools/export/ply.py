@@ -1,7 +1,7 @@
 """The points of every node as PLY in a folder, ID.ply, for MeshLab, CloudCompare, Open3D and the like.
 
-A floor has what lies above its surface and below the next one's; a room what of its floor lies within its outline (of
-its walls no more than the inner faces); a location the points of its objects; an object its own, in its median colour.
+A floor has all points between its surface and the next one's; a room those of its floor within its outline, so that
+of its walls only the inner faces are there; a location those of its objects; an object its own, in its median colour.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from placegraph.nodes.hierarchy.rooms import floor_grid
 from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.map_files.map_folder import RGB, prepare, read_cloud, read_object_clouds
+from placegraph.tools.map_files.map_folder import RGB, make_empty_folder, read_cloud, read_object_clouds
 from placegraph.tools.map_files.ply import write_points
 
 Cloud = tuple[F32, U8]  # (P, 3) metres, world frame; (P, 3) sRGB
 
-CELL_M = 0.05  # of the plan in which a point is in a room or not: that of the room layer
-BELOW_M = 0.1  # noise of a floor's surface that is still the floor's
+CELL_M = 0.05  # of the grid on which rooms are drawn to find their points; that of the room layer
+BELOW_M = 0.1  # depth below a floor's surface that still belongs to it: noise
 GRAY = (128, 128, 128)
 
 
@@ -30,8 +30,8 @@ def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
 
     Raises ConfigError when the folder is not empty, SchemaError when the map's clouds are missing or of another run.
     """
-    clouds = _places(graph, *read_cloud(folder)) | _things(folder, graph)
-    prepare(out)
+    clouds = _place_clouds(graph, *read_cloud(folder)) | _object_clouds(folder, graph)
+    make_empty_folder(out)
     written = []
     for node in graph.nodes.values():
         xyz, rgb = clouds.get(node.id, (np.zeros((0, 3)), np.zeros((0, 3))))
@@ -41,7 +41,7 @@ def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
     return written
 
 
-def _places(graph: SceneGraph, xyz: F32, rgb: U8) -> dict[str, Cloud]:
+def _place_clouds(graph: SceneGraph, xyz: F32, rgb: U8) -> dict[str, Cloud]:
     floors = sorted(graph.layer("floor"), key=lambda floor: float(floor.box[0, 2]))
     surfaces = np.array([floor.box[0, 2] for floor in floors]) - BELOW_M
     level = np.maximum(np.searchsorted(surfaces, xyz[:, 2], side="right") - 1, 0)
@@ -63,7 +63,7 @@ def _inside(points: F32, room: Node) -> Bool:
     return np.asarray(mask[grid.cells(points)] > 0)
 
 
-def _things(folder: Path, graph: SceneGraph) -> dict[str, Cloud]:
+def _object_clouds(folder: Path, graph: SceneGraph) -> dict[str, Cloud]:
     points = read_object_clouds(folder)
     clouds: dict[str, Cloud] = {}
     for thing in graph.layer("object"):
@@ -72,7 +72,7 @@ def _things(folder: Path, graph: SceneGraph) -> dict[str, Cloud]:
         color = np.array(thing.color or GRAY, np.uint8)
         clouds[thing.id] = points[thing.id], np.tile(color, (len(points[thing.id]), 1))
     for location in graph.layer("location"):
-        held = [clouds[thing.id] for thing in graph.descendants(location.id, "object")]
-        if held:
-            clouds[location.id] = np.concatenate([xyz for xyz, _ in held]), np.concatenate([rgb for _, rgb in held])
+        parts = [clouds[thing.id] for thing in graph.descendants(location.id, "object")]
+        if parts:
+            clouds[location.id] = np.concatenate([xyz for xyz, _ in parts]), np.concatenate([rgb for _, rgb in parts])
     return clouds

@@ -1,4 +1,4 @@
-"""Poses as the pose graph corrected them."""
+"""The poses of odometry, corrected by the pose graph."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from placegraph.runtime.messages import Correction, Pose
 from placegraph.runtime.vision.geometry import inverse, nearest_rigid
 
 
-class CorrectedKeyframes:
-    """Where the pose graph has each keyframe, by frame id, as its Corrections come in."""
+class CorrectedTrajectory:
+    """Keeps the corrected pose of each keyframe, and moves the other frames with them."""
 
     def __init__(self) -> None:
-        self._poses: dict[int, F64] = {}
+        self._keyframes: dict[int, F64] = {}  # world_from_camera (4, 4) by frame id
 
     def add(self, correction: Correction) -> None:
-        """Take the keyframe's own pose, and the new ones of those that moved."""
-        self._poses[correction.frame_id] = correction.world_from_camera
+        """Take the keyframe's pose, and the new poses of the keyframes that moved."""
+        self._keyframes[correction.frame_id] = correction.world_from_camera
         moved = zip(correction.moved_frame_ids.tolist(), correction.moved_world_from_camera, strict=True)
-        self._poses.update(moved)
+        self._keyframes.update(moved)
 
     def correct(self, poses: Sequence[Pose]) -> list[Pose]:
-        """Odometry's poses, each moved with the last keyframe at or before it; as they are where there is none."""
+        """Poses, each moved with the last keyframe at or before it; unchanged without any keyframe."""
         odometry = {pose.frame_id: pose.world_from_camera for pose in poses}
-        known = sorted(frame_id for frame_id in self._poses if frame_id in odometry)
-        if not known:
+        keyframe_ids = sorted(frame_id for frame_id in self._keyframes if frame_id in odometry)
+        if not keyframe_ids:
             return list(poses)
-        found = []
+        corrected = []
         for pose in poses:
-            key = known[max(0, bisect_right(known, pose.frame_id) - 1)]
-            moved = self._poses[key] @ inverse(odometry[key]) @ pose.world_from_camera
-            found.append(dataclasses.replace(pose, world_from_camera=nearest_rigid(moved)))
-        return found
+            key = keyframe_ids[max(0, bisect_right(keyframe_ids, pose.frame_id) - 1)]
+            moved = self._keyframes[key] @ inverse(odometry[key]) @ pose.world_from_camera
+            corrected.append(dataclasses.replace(pose, world_from_camera=nearest_rigid(moved)))
+        return corrected

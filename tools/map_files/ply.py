@@ -1,6 +1,6 @@
-"""Points in PLY files: any writer's vertices are read, ASCII or binary; ours are written binary.
+"""Points in PLY files: reads the vertices of any writer, ASCII or binary; writes binary.
 
-Source: Turk, "The PLY Polygon File Format", 1994; type names also as today's writers have them (`float32` for `float`).
+Source: Turk, "The PLY Polygon File Format", 1994, and the newer type names (`float32` for `float`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TYPES = {
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4"},
     **{"double": "f8", "float64": "f8"},
 }
-NAMES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}  # what is written
+TYPE_NAMES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}  # that are written
 BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 END = re.compile(rb"^end_header[ \t]*\r?(\n|$)", re.MULTILINE)
 
@@ -37,9 +37,9 @@ class _Element:
 
 
 def read_vertices(path: Path) -> NDArray[Any]:
-    """The vertices as a structured array (N,), with a field of its own type for each property.
+    """The vertices as a structured array (N,) with a field for each property.
 
-    Other elements, such as faces, are passed over. Raises SchemaError where the file is not what its header says.
+    Other elements, such as faces, are skipped. Raises SchemaError where the file does not match its header.
     """
     try:
         data = path.read_bytes()
@@ -54,7 +54,9 @@ def read_vertices(path: Path) -> NDArray[Any]:
         if element.name == "vertex":
             return _read_body(path, data[end.end() :], order, before, element)
         before.append(element)
-    raise SchemaError(f"{path}: holds no vertices, only: {', '.join(one.name for one in elements) or 'nothing'}")
+    raise SchemaError(
+        f"{path}: holds no vertices, only: {', '.join(element.name for element in elements) or 'nothing'}"
+    )
 
 
 def points_of(rows: NDArray[Any], path: Path) -> F64:
@@ -79,12 +81,12 @@ def write_points(
         rows[name] = values
     header = ["ply", "format binary_little_endian 1.0", *(f"comment {' '.join(text.split())}" for text in comments)]
     header.append(f"element vertex {len(xyz)}")
-    header += [f"property {NAMES[values.dtype.str[1:]]} {name}" for name, values in named.items()]
+    header += [f"property {TYPE_NAMES[values.dtype.str[1:]]} {name}" for name, values in named.items()]
     path.write_bytes("\n".join([*header, "end_header", ""]).encode() + rows.tobytes())
 
 
 def _read_header(path: Path, lines: list[str]) -> tuple[str, list[_Element]]:
-    """Byte order of numpy, or "=" for ASCII; and what the body holds, in order."""
+    """Numpy's byte order, "=" for ASCII; and the elements of the body, in order."""
     order, elements = "", list[_Element]()
     for number, line in enumerate(lines, 1):
         match line.split():
@@ -110,20 +112,26 @@ def _read_header(path: Path, lines: list[str]) -> tuple[str, list[_Element]]:
 
 def _read_body(path: Path, body: bytes, order: str, before: list[_Element], vertex: _Element) -> NDArray[Any]:
     names = [name for name, _ in vertex.fields]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice or vertex.lists or not names:
-        wrong = f"property {twice} twice" if twice else f"the list {vertex.lists[0]}" if vertex.lists else "no property"
+    repeated = next((name for name in names if names.count(name) > 1), None)
+    if repeated or vertex.lists or not names:
+        wrong = (
+            f"property {repeated} twice"
+            if repeated
+            else f"the list {vertex.lists[0]}"
+            if vertex.lists
+            else "no property"
+        )
         raise SchemaError(f"{path}: its vertices have {wrong}")
     if order == "=":
-        return _read_ascii(path, body, sum(one.count for one in before), vertex)
-    lists = next((one for one in before if one.lists), None)
+        return _read_ascii(path, body, sum(element.count for element in before), vertex)
+    lists = next((element for element in before if element.lists), None)
     if lists:
         raise SchemaError(f"{path}: {lists.name}, of varying length, stands before the vertices; write vertices first")
-    start = sum(one.count * np.dtype([(n, t) for n, t in one.fields]).itemsize for one in before)
+    start = sum(element.count * np.dtype(list(element.fields)).itemsize for element in before)
     row = np.dtype([(name, order + kind) for name, kind in vertex.fields])
     if len(body) < start + vertex.count * row.itemsize:
-        whole = max(0, len(body) - start) // row.itemsize
-        raise SchemaError(f"{path}: cut short: {vertex.count} vertices are announced, {whole} are there")
+        complete = max(0, len(body) - start) // row.itemsize
+        raise SchemaError(f"{path}: cut short: {vertex.count} vertices are announced, {complete} are there")
     return np.frombuffer(body, row, vertex.count, start)
 
 

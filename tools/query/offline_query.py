@@ -1,4 +1,4 @@
-"""Puts questions to maps and object lists in files: one grounding node, which is shown the graph of each question."""
+"""Questions about maps and object lists in files, answered by one grounding node in this process."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from placegraph.runtime.scene_graph.object_list import OwnId
 from placegraph.runtime.scene_graph.object_list_import import load_scene
 from placegraph.tools.map_files.map_folder import RUN, find_graph, read_config
 
-KEPT = 4  # files whose graphs are kept: lines about one scene mostly follow each other
+MAX_OPEN_FILES = 4  # whose graphs are kept in memory: lines about one file mostly follow each other
 NODE_ID = re.compile(r"\b[FRO](?:0|[1-9][0-9]*)\b")
 
 
 @dataclass(frozen=True)
-class _Opened:
+class _OpenFile:
     graph: Graph
     ids: dict[str, OwnId]
     settings: dict[str, Any]
@@ -32,15 +32,15 @@ class _Opened:
 
 
 class OfflineQuery:
-    """Answers questions about files, each as its own run would have; a context manager, whose end frees the model."""
+    """Answers questions about files, each with its own run's settings; a context manager that frees the model."""
 
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
-        """settings: of the grounding node, over those of the files' runs."""
+        """settings: of the grounding node; they replace those of the files' runs."""
         self._settings = settings or {}
-        self._open = lru_cache(KEPT)(self._read)
+        self._open = lru_cache(MAX_OPEN_FILES)(self._read)
         self._node: Node | None = None
         self._built_for: tuple[dict[str, Any], Context] | None = None
-        self._shown: _Opened | None = None
+        self._current: _OpenFile | None = None
 
     def __enter__(self) -> OfflineQuery:
         return self
@@ -49,7 +49,7 @@ class OfflineQuery:
         self._stop()
 
     def check(self, path: Path) -> None:
-        """Read a file that will be asked; raises SchemaError when it is none that can be."""
+        """Read a file before it is asked; raises SchemaError when it can not be."""
         self._open(path)
 
     def ask(self, path: Path, question: Question) -> dict[str, Any]:
@@ -57,52 +57,52 @@ class OfflineQuery:
 
         Raises SchemaError for a file that is none of these, ModelError where the language model is missing.
         """
-        opened = self._open(path)
-        node = self._show(opened)
+        file = self._open(path)
+        node = self._node_with(file)
         began_s = time.monotonic()
         answers = [message for message in node.step(question) if isinstance(message, Answer)]
         ms = (time.monotonic() - began_s) * 1e3
         if not answers:
             raise QueryError("the grounding node gave no answer")
-        return in_own_ids(finished(json.loads(answers[0].json), ms), opened.ids)
+        return with_own_ids(finished(json.loads(answers[0].json), ms), file.ids)
 
-    def _read(self, path: Path) -> _Opened:
+    def _read(self, path: Path) -> _OpenFile:
         scene = load_scene(find_graph(path))
         settings: dict[str, Any] = {}
         context = Context()
-        if path.is_dir() and (path / RUN).exists():  # ask the map the way its run would have answered
+        if path.is_dir() and (path / RUN).exists():  # answer with the settings of the map's own run
             config = read_config(path)
             settings = config.nodes.get("grounding", {})
             context = Context(model_dirs=tuple(config.run.model_dirs), threads=config.run.threads)
         graph = Graph(frame_id=-1, stamp_ns=0, revision=0, final=True, named=True, json=scene.graph.to_json())
-        return _Opened(graph, scene.ids, settings | self._settings, context)
+        return _OpenFile(graph, scene.ids, settings | self._settings, context)
 
-    def _show(self, opened: _Opened) -> Node:
-        """The node for a file's settings, which has seen its graph."""
-        if self._node is None or self._built_for != (opened.settings, opened.context):
+    def _node_with(self, file: _OpenFile) -> Node:
+        """The node with the file's settings and graph."""
+        if self._node is None or self._built_for != (file.settings, file.context):
             self._stop()
-            self._node = build_node("grounding", opened.settings, opened.context)
+            self._node = build_node("grounding", file.settings, file.context)
             self._node.start()
-            self._built_for = opened.settings, opened.context
-        if self._shown is not opened:
-            self._node.step(opened.graph)
-            self._shown = opened
+            self._built_for = file.settings, file.context
+        if self._current is not file:
+            self._node.step(file.graph)
+            self._current = file
         return self._node
 
     def _stop(self) -> None:
-        node, self._node, self._shown = self._node, None, None
+        node, self._node, self._current = self._node, None, None
         if node is not None:
             node.stop()
 
 
-def in_own_ids(reply: dict[str, Any], ids: dict[str, OwnId]) -> dict[str, Any]:
-    """The same reply with the ids by which a file's maker knows things, in its sentences too."""
+def with_own_ids(reply: dict[str, Any], ids: dict[str, OwnId]) -> dict[str, Any]:
+    """The same reply with the ids of the file's author in place of the graph's, in its sentences too."""
 
     def own(node_id: str | None) -> OwnId | None:
         return None if node_id is None else ids.get(node_id, node_id)
 
-    def said(sentences: list[str]) -> list[str]:
-        return [NODE_ID.sub(lambda found: str(own(found[0])), sentence) for sentence in sentences]
+    def rewritten(sentences: list[str]) -> list[str]:
+        return [NODE_ID.sub(lambda match: str(own(match[0])), sentence) for sentence in sentences]
 
     if not ids:
         return reply
@@ -110,6 +110,8 @@ def in_own_ids(reply: dict[str, Any], ids: dict[str, OwnId]) -> dict[str, Any]:
         "object_id": own(reply["object_id"]),
         "path": [step | {"id": own(step["id"])} for step in reply["path"]],
         "route": [own(node_id) for node_id in reply["route"]],
-        "evidence": said(reply["evidence"]),
-        "candidates": [one | {"id": own(one["id"]), "evidence": said(one["evidence"])} for one in reply["candidates"]],
+        "evidence": rewritten(reply["evidence"]),
+        "candidates": [
+            thing | {"id": own(thing["id"]), "evidence": rewritten(thing["evidence"])} for thing in reply["candidates"]
+        ],
     }

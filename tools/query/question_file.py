@@ -1,4 +1,4 @@
-"""Many questions about maps or object lists in one process: lines of JSON in, lines of JSON out (README, "Asking")."""
+"""Files of questions about maps or object lists: JSON lines in, JSON lines out, one process for all."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from placegraph.tools.query.offline_query import OfflineQuery
 
 logger = logging.getLogger(__name__)
 
-PARTIAL = ".partial"  # behind the name of --out until all answers are there
+PARTIAL = ".partial"  # ending of the answers' file until all answers are there
 FIELDS = ("object_id", "status", "error", "candidates", "evidence", "parse", "sure", "llm_calls", "ms")
 
 
 @dataclass
-class Tally:
-    """What became of the questions."""
+class AnswerCounts:
+    """The answers by status, and their times."""
 
     statuses: Counter[str] = field(default_factory=Counter)
     ms: list[float] = field(default_factory=list)
@@ -38,26 +38,26 @@ class Tally:
         self.statuses[answer["status"]] += 1
         self.ms.append(answer["ms"])
 
-    def in_words(self) -> str:
-        """One line."""
+    def text(self) -> str:
+        """One line for people."""
         found, absent, errors = (self.statuses[status] for status in ("found", "not_in_map", "error"))
         p50, p95 = np.percentile(self.ms or [0.0], (50, 95))
-        asked = f"{len(self.ms)} questions: {found} found, {absent} not in the map, {errors} errors"
-        return f"{asked}; {p50:.1f} ms median, {p95:.1f} ms p95"
+        counts = f"{len(self.ms)} questions: {found} found, {absent} not in the map, {errors} errors"
+        return f"{counts}; {p50:.1f} ms median, {p95:.1f} ms p95"
 
 
-class Batch:
-    """Answers lines of questions; whatever a line holds, it gets one answer."""
+class LineAnswerer:
+    """Answers lines of a questions' file; every line gets one answer, whatever it holds."""
 
     def __init__(
-        self, answerer: OfflineQuery, folder: Path, graph: Path | None, *, k: int = 5, mode: str = "program"
+        self, query: OfflineQuery, folder: Path, graph: Path | None, *, k: int = 5, mode: str = "program"
     ) -> None:
-        """folder: where relative `graph` paths of lines start; graph: of lines that name none; k, mode: likewise."""
-        self._answerer, self._folder, self._graph = answerer, folder, graph
+        """folder: base of relative `graph` paths in lines; graph, k, mode: for lines that do not have their own."""
+        self._query, self._folder, self._graph = query, folder, graph
         self._defaults = {"k": k, "mode": mode}
 
     def answer(self, number: int, line: bytes) -> dict[str, Any]:
-        """The answer to a line; an error tells its number. Raises ModelError and ConfigError: no line can be asked."""
+        """The answer to a line; an error names its number. Raises ModelError, ConfigError: they concern all lines."""
         question_id: OwnId | None = None
         try:
             fields = _fields(line)
@@ -67,7 +67,7 @@ class Batch:
             reply = refusal(str(error))
         except (ModelError, ConfigError):
             raise
-        except Exception as error:  # a bug; the other lines are still to be answered
+        except Exception as error:  # a bug; the other lines can still be answered
             logger.exception("line %d", number)
             reply = refusal(f"{type(error).__name__}: {error}")
         if reply["status"] == "error":
@@ -75,19 +75,19 @@ class Batch:
         return {"question_id": question_id} | {name: reply[name] for name in FIELDS}
 
     def _ask(self, fields: dict[str, Any]) -> dict[str, Any]:
-        if "viewpoint" in fields:  # other fields that are not read are the caller's own
+        if "viewpoint" in fields:  # an easy mistake; other unknown fields are the caller's own
             raise QueryError("unknown field 'viewpoint'; it is called pose")
-        asked = self._defaults | fields
-        question = make_question(asked.get("text"), k=asked["k"], mode=asked["mode"], pose=asked.get("pose"))
-        named = fields.get("graph")
-        if named is not None and (not isinstance(named, str) or not named):
+        options = self._defaults | fields
+        question = make_question(options.get("text"), k=options["k"], mode=options["mode"], pose=options.get("pose"))
+        graph = fields.get("graph")
+        if graph is not None and (not isinstance(graph, str) or not graph):
             raise QueryError("graph: expected the path of a map folder, a graph or an object list")
-        path = self._graph if named is None else self._folder / named
+        path = self._graph if graph is None else self._folder / graph
         if path is None:
             raise QueryError("graph: expected in each line, as --graph names none")
         try:
-            return self._answerer.ask(path, question)
-        except OSError as error:  # a path that cannot be one: too long
+            return self._query.ask(path, question)
+        except OSError as error:  # for example a name that is too long
             raise QueryError(f"graph: {error.strerror}") from None
 
 
@@ -106,35 +106,35 @@ def _fields(line: bytes) -> dict[str, Any]:
 
 
 def _id(fields: dict[str, Any]) -> OwnId:
-    own = fields.get("id")
-    if type(own) is int:
-        return own
-    if not isinstance(own, str) or not own or any("\ud800" <= character <= "\udfff" for character in own):
+    line_id = fields.get("id")
+    if type(line_id) is int:
+        return line_id
+    if not isinstance(line_id, str) or not line_id or any("\ud800" <= c <= "\udfff" for c in line_id):
         raise QueryError("id: expected text that is not empty, or a whole number")
-    return own
+    return line_id
 
 
-def answer_all(batch: Batch, questions: Path, out: Path) -> Tally:
-    """Answer every line of `questions`, blank ones left out, into `out`, a line each in their order.
+def answer_all(answerer: LineAnswerer, questions: Path, out: Path) -> AnswerCounts:
+    """Answer every line of `questions`, blank ones left out, with one line of `out` each, in the same order.
 
-    Each answer is written before the next question is asked, to `out` with ".partial" behind its name, which becomes
-    `out` when all are there: what was answered before an end by force is kept, and an older `out` is whole until then.
+    Each answer is written at once to `out` with ".partial" behind its name, and the file is renamed when all are there:
+    a run that is killed leaves its answers so far, and an older `out` stays whole until then.
     Raises QueryError when the questions cannot be read, ConfigError when the answers cannot be written.
     """
     try:
         lines = [(number, line) for number, line in enumerate(questions.read_bytes().split(b"\n"), 1) if line.strip()]
     except OSError as error:
         raise QueryError(f"{questions}: cannot read: {error.strerror}") from None
-    partial, tally = out.with_name(out.name + PARTIAL), Tally()
+    partial, counts = out.with_name(out.name + PARTIAL), AnswerCounts()
     console = Console(stderr=True)
     try:
         with partial.open("w", encoding="utf-8") as file:
             for number, line in track(lines, "asking", console=console, disable=not console.is_terminal):
-                answer = batch.answer(number, line)
+                answer = answerer.answer(number, line)
                 file.write(json.dumps(answer, ensure_ascii=False, allow_nan=False) + "\n")
                 file.flush()
-                tally.add(answer)
+                counts.add(answer)
         os.replace(partial, out)
     except OSError as error:
         raise ConfigError(f"{out}: cannot write: {error.strerror}") from None
-    return tally
+    return counts

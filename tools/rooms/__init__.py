@@ -16,13 +16,13 @@ from pydantic import BaseModel, ValidationError
 from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, areas_of, segment_rooms, walls_of_plan
 from placegraph.runtime.arrays import Bool
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.tools.rooms.point_cloud import FloorRooms, floors_of_scan, read_scan
+from placegraph.tools.rooms.point_cloud import FloorRooms, floors_of_cloud, read_point_cloud
 
 MAX_ROOMS = np.iinfo(np.uint16).max
 
 
-class MapFile(BaseModel, frozen=True, extra="ignore"):
-    """The YAML beside a map's image. Source: ROS map_server; its thresholds stand in where no YAML is given."""
+class MapYaml(BaseModel, frozen=True, extra="ignore"):
+    """The YAML beside a map's image. Source: ROS map_server, whose thresholds are the defaults."""
 
     image: str
     resolution: float  # metres a pixel
@@ -34,7 +34,7 @@ class MapFile(BaseModel, frozen=True, extra="ignore"):
 
 @dataclass(frozen=True, eq=False)
 class OccupancyMap:
-    """Bool images, row 0 at the top as in the file (what is neither is unknown), and where they lie."""
+    """Bool images with row 0 at the top as in the file, and their position; cells that are neither are unknown."""
 
     occupied: Bool
     free: Bool
@@ -61,12 +61,12 @@ def rooms(
 ) -> None:
     """Split an occupancy map (PNG, PGM, ROS's YAML), or a point cloud's floors (PLY), into rooms as label images."""
     if source.suffix.lower() == ".ply":
-        floors = [_floor_row(*one) for one in _write_floors(source, out, resolution)]
+        floors = [_floor_row(*floor) for floor in _write_floors(source, out, resolution)]
         print(json.dumps({"floors": floors}, sort_keys=True) if as_json else "\n".join(map(_floor_text, floors)))
         return
-    grid, found = rooms_of_plan(read_map(source, resolution))
-    _write_labels(out, source, grid, found)
-    rows = [_row(number, room, grid.cell_m) for number, room in enumerate(found, 1)]
+    grid, areas = rooms_of_plan(read_map(source, resolution))
+    _write_labels(out, source, grid, areas)
+    rows = [_row(number, area, grid.cell_m) for number, area in enumerate(areas, 1)]
     print(json.dumps({"rooms": rows}, sort_keys=True) if as_json else _text(rows, out))
 
 
@@ -75,28 +75,30 @@ def read_map(path: Path, resolution: float | None = None) -> OccupancyMap:
     if path.suffix.lower() in (".yaml", ".yml"):
         if resolution is not None:
             raise ConfigError(f"--resolution: {path} brings its own")
-        listed = _read_yaml(path)
-        image = path.parent / listed.image
+        description = _read_yaml(path)
+        image = path.parent / description.image
     elif resolution is None:
-        raise ConfigError(f"--resolution: how many metres a pixel of {path} is; only a YAML tells")
+        raise ConfigError(f"--resolution: missing: how many metres is a pixel of {path}?")
     else:
-        listed, image = MapFile(image=path.name, resolution=resolution), path
-    if not listed.resolution > 0:
-        raise ConfigError(f"{path}: a resolution of {listed.resolution} metres a pixel is not positive")
-    if listed.origin[2] != 0:
-        raise SourceError(f"{path}: its origin is turned by {listed.origin[2]} rad; only maps that are not are read")
+        description, image = MapYaml(image=path.name, resolution=resolution), path
+    if not description.resolution > 0:
+        raise ConfigError(f"{path}: a resolution of {description.resolution} metres a pixel is not positive")
+    if description.origin[2] != 0:
+        raise SourceError(
+            f"{path}: its origin is rotated by {description.origin[2]} rad; only unrotated maps can be read"
+        )
     gray = cv2.imread(str(image), cv2.IMREAD_GRAYSCALE)
     if gray is None:
         raise SourceError(f"{image}: no such file, or not an image")
-    dark = np.asarray(gray, float) / 255 if listed.negate else 1 - np.asarray(gray, float) / 255
-    occupied, free = dark > listed.occupied_thresh, dark < listed.free_thresh
-    return OccupancyMap(occupied, free, listed.resolution, listed.origin[:2])
+    dark = np.asarray(gray, float) / 255 if description.negate else 1 - np.asarray(gray, float) / 255
+    occupied, free = dark > description.occupied_thresh, dark < description.free_thresh
+    return OccupancyMap(occupied, free, description.resolution, description.origin[:2])
 
 
 def rooms_of_plan(plan: OccupancyMap) -> tuple[Grid, list[RoomArea]]:
     """Rooms, largest first; the grid's rows run along +y, so bottom up in the image. Source: nodes/hierarchy/rooms.py.
 
-    Short pieces of what is occupied are taken for furniture, which is part of its room.
+    Short occupied pieces count as furniture, which is part of its room.
     """
     config = RoomConfig(cell_m=plan.resolution)
     occupied, known = plan.occupied[::-1], (plan.occupied | plan.free)[::-1]
@@ -105,9 +107,9 @@ def rooms_of_plan(plan: OccupancyMap) -> tuple[Grid, list[RoomArea]]:
     return grid, areas_of(labels, grid, config)
 
 
-def _read_yaml(path: Path) -> MapFile:
+def _read_yaml(path: Path) -> MapYaml:
     try:
-        return MapFile.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+        return MapYaml.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise SourceError(f"{path}: cannot read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -119,7 +121,7 @@ def _read_yaml(path: Path) -> MapFile:
 
 def _write_floors(source: Path, out: Path, resolution: float | None) -> list[tuple[int, FloorRooms, Path]]:
     """Label images of a cloud's floors: (number from the lowest, floor, file)."""
-    floors = floors_of_scan(read_scan(source), RoomConfig().cell_m if resolution is None else resolution)
+    floors = floors_of_cloud(read_point_cloud(source), RoomConfig().cell_m if resolution is None else resolution)
     written = []
     for number, floor in enumerate(floors, 1):
         file = out if len(floors) == 1 else out.with_name(f"{out.stem}-{number}{out.suffix}")
@@ -128,11 +130,11 @@ def _write_floors(source: Path, out: Path, resolution: float | None) -> list[tup
     return written
 
 
-def _write_labels(out: Path, source: Path, grid: Grid, found: list[RoomArea]) -> None:
-    if len(found) > MAX_ROOMS:
-        raise SourceError(f"{source}: {len(found)} rooms do not fit a 16 bit image")
+def _write_labels(out: Path, source: Path, grid: Grid, areas: list[RoomArea]) -> None:
+    if len(areas) > MAX_ROOMS:
+        raise SourceError(f"{source}: {len(areas)} rooms do not fit a 16 bit image")
     labels = np.zeros(grid.shape, np.uint16)
-    for number, room in enumerate(found, 1):
+    for number, room in enumerate(areas, 1):
         labels[room.mask] = number
     if out.suffix.lower() != ".png" or not cv2.imwrite(str(out), labels[::-1]):
         raise ConfigError(f"--out {out}: cannot write a picture there; is it a .png in a folder that exists?")

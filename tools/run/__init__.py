@@ -21,8 +21,9 @@ from placegraph.runtime.inline import Inline
 from placegraph.runtime.launch import Launcher
 from placegraph.runtime.messages import Correction, End, Frame, Graph, Health, Keyframe, Map, Message, Pose
 from placegraph.tools.evaluate import against_given
-from placegraph.tools.map_files.map_folder import GRAPH, Collector, next_folder, prepare, write_run
-from placegraph.tools.run.progress_table import Progress
+from placegraph.tools.map_files.map_folder import GRAPH, make_empty_folder, next_folder, write_run
+from placegraph.tools.run.map_collector import MapCollector
+from placegraph.tools.run.progress_table import ProgressTable
 
 POLL_S = 0.1
 FINISH_TIMEOUT_S = 300.0  # after Ctrl-C or a live source's end: for what is in flight to reach the map
@@ -56,15 +57,15 @@ def run(
 
 
 def source_settings(config: RunConfig, source: Path | None) -> dict[str, Any]:
-    """What `--source` changes of the camera's settings; raises SourceError, ConfigError when its format is not known.
+    """The camera settings that `--source` changes; raises SourceError, ConfigError when its format is not known.
 
-    A config that names another source gives way: a camera's config also maps a recording of that camera.
+    The path's own format replaces the config's source, so that a camera's config also maps a recording of that camera.
     """
     if source is None:
         return {}
     changes: dict[str, Any] = {"path": str(source)}
-    named = config.nodes.get("camera", {}).get("source", "auto")
-    if named != "auto" and named != detect(str(source)).__module__.rpartition(".")[2]:
+    configured = config.nodes.get("camera", {}).get("source", "auto")
+    if configured != "auto" and configured != detect(str(source)).__module__.rpartition(".")[2]:
         changes |= {"source": "auto", "settings": {}}
     return changes
 
@@ -88,9 +89,9 @@ def run_dataflow(config: RunConfig, name: str, out: Path | None, inline: bool, q
         raise ConfigError("--stay needs processes: an inline run has no bus to answer on")
     folder = (out or next_folder(Path(config.run.out_dir), name)).resolve()
     dataflow = build(config, folder)
-    prepare(folder)
-    collector = Collector(dataflow)
-    progress = Progress(dataflow, quiet)
+    make_empty_folder(folder)
+    collector = MapCollector(dataflow)
+    progress = ProgressTable(dataflow, quiet)
     try:
         with progress:
             if inline:
@@ -98,7 +99,7 @@ def run_dataflow(config: RunConfig, name: str, out: Path | None, inline: bool, q
             else:
                 nodes = _run_processes(dataflow, folder, collector, progress, stay)
     except PlacegraphError as error:
-        raise type(error)(f"{error}{_keep(collector, folder)}") from None
+        raise type(error)(f"{error}{_save_partial_map(collector, folder)}") from None
     summary = _summary(dataflow, collector, nodes)
     effective = {name: node.config.model_dump(mode="json") for name, node in dataflow.nodes.items()}
     try:
@@ -110,8 +111,8 @@ def run_dataflow(config: RunConfig, name: str, out: Path | None, inline: bool, q
     return folder
 
 
-def _keep(collector: Collector, folder: Path) -> str:
-    """Write what there is of a run that failed: an hour's mapping is not thrown away for its last minute. Says what."""
+def _save_partial_map(collector: MapCollector, folder: Path) -> str:
+    """Write the map of a run that failed, as far as it got; returns a sentence about it, "" without a graph."""
     if collector.graph is None:
         return ""
     try:
@@ -122,7 +123,7 @@ def _keep(collector: Collector, folder: Path) -> str:
     return f"\n{folder} holds {which}"
 
 
-def _run_inline(dataflow: Dataflow, collector: Collector, progress: Progress) -> list[Health]:
+def _run_inline(dataflow: Dataflow, collector: MapCollector, progress: ProgressTable) -> list[Health]:
     last = time.monotonic()
 
     def observe(message: Message) -> None:
@@ -133,23 +134,23 @@ def _run_inline(dataflow: Dataflow, collector: Collector, progress: Progress) ->
             last = time.monotonic()
 
     shell = Inline(dataflow, observe)
-    collector.clock.begin()
+    collector.timer.begin()
     with shell:
-        collector.clock.ready()
+        collector.timer.ready()
         shell.run()
-    collector.clock.done()
+    collector.timer.done()
     return [stats.report(0.0, 0, 0.0) for stats in shell.stats.values()]
 
 
-def _show_stats(stats: dict[str, StepStats], progress: Progress, elapsed_s: float) -> None:
-    for one in stats.values():
-        progress.add(one.report(elapsed_s, 0, 0.0))
+def _show_stats(stats: dict[str, StepStats], progress: ProgressTable, elapsed_s: float) -> None:
+    for node_stats in stats.values():
+        progress.add(node_stats.report(elapsed_s, 0, 0.0))
     progress.refresh()
 
 
 @contextmanager
 def _interrupts() -> Iterator[list[int]]:
-    """Collect SIGINT and SIGTERM in a list; the second one breaks off whatever is waited for."""
+    """Collect SIGINT and SIGTERM in a list; the second one raises PlacegraphError and so ends any waiting."""
     received: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -166,7 +167,7 @@ def _interrupts() -> Iterator[list[int]]:
 
 
 def _run_processes(
-    dataflow: Dataflow, folder: Path, collector: Collector, progress: Progress, stay: bool
+    dataflow: Dataflow, folder: Path, collector: MapCollector, progress: ProgressTable, stay: bool
 ) -> list[Health]:
     messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
     health: dict[str, Health] = {}
@@ -182,9 +183,9 @@ def _run_processes(
     with _interrupts() as interrupts, Launcher(dataflow, folder) as launcher:
         for kind in (Pose, Correction, Map, Graph, Health, End):
             launcher.observe(kind, messages.put)
-        collector.clock.begin()
+        collector.timer.begin()
         launcher.start(lambda: bool(interrupts))
-        collector.clock.ready()
+        collector.timer.ready()
         give_up_at = float("inf")
         while not collector.complete or (stay and not interrupts):
             time.sleep(POLL_S)
@@ -192,7 +193,7 @@ def _run_processes(
             drain()
             progress.refresh()
             if collector.complete:
-                collector.clock.done()
+                collector.timer.done()
             if stay and collector.complete and not (folder / GRAPH).exists():
                 collector.write(folder)
                 progress.say(f"mapped; answering questions at {dataflow.config.bus.endpoint} until Ctrl-C")
@@ -202,7 +203,7 @@ def _run_processes(
                 )
                 launcher.stop_source()
                 give_up_at = time.monotonic() + FINISH_TIMEOUT_S
-            if collector.ended and not dataflow.context.lossless:  # live, the last keyframe may have died with a node
+            if collector.ended and not dataflow.context.lossless:  # the last keyframe may be lost
                 give_up_at = min(give_up_at, time.monotonic() + FINISH_TIMEOUT_S)
             if time.monotonic() > give_up_at and not collector.complete:
                 raise PlacegraphError(f"the last graph did not come within {FINISH_TIMEOUT_S:g} s of the source's end")
@@ -211,16 +212,16 @@ def _run_processes(
     return [health[name] for name in dataflow.nodes if name in health]
 
 
-def _summary(dataflow: Dataflow, collector: Collector, nodes: list[Health]) -> dict[str, Any]:
+def _summary(dataflow: Dataflow, collector: MapCollector, nodes: list[Health]) -> dict[str, Any]:
     from placegraph.runtime.scene_graph import SceneGraph
 
     frames, poses = collector.frames, collector.poses
     estimated = {pose.stamp_ns: pose.world_from_camera[:3, 3] for pose in poses if pose.trusted}
     summary: dict[str, Any] = {
-        "start_s": round(collector.clock.start_s, 2),
-        "mapping_s": round(collector.clock.mapping_s, 2),
+        "start_s": round(collector.timer.start_s, 2),
+        "mapping_s": round(collector.timer.mapping_s, 2),
         "frames": frames,
-        "frames_per_s": round(frames / collector.clock.mapping_s, 2) if frames else 0.0,
+        "frames_per_s": round(frames / collector.timer.mapping_s, 2) if frames else 0.0,
         "keyframes": collector.map.keyframes if collector.map else 0,
         "untrusted_poses": sum(not pose.trusted for pose in poses),
         "trajectory": against_given(estimated, dataflow.source.given_poses()),

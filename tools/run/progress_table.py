@@ -1,4 +1,4 @@
-"""What a person sees while a dataflow runs: a table of the nodes, and the numbers at the end."""
+"""The terminal display of a run: a live table of the nodes, and the numbers at the end."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Any
 
 from rich.console import Console
 from rich.live import Live
-from rich.table import Table
+from rich.table import Column, Table
 
 from placegraph.runtime.config import Dataflow
 from placegraph.runtime.messages import Health
 from placegraph.runtime.messages.topics import TOPICS
 
-PLAIN_PERIOD_S = 5.0  # without a terminal: a line this often
+PLAIN_PERIOD_S = 5.0  # between lines, where standard error is not a terminal
 MIN_RATE_SHARE = 0.9  # of a topic's declared rate; below it a live node is marked
 
 
-class Progress:
+class ProgressTable:
     """Live table on a terminal, a line every few seconds elsewhere, nothing when quiet. Use as a context manager."""
 
     def __init__(self, dataflow: Dataflow, quiet: bool) -> None:
@@ -27,7 +27,7 @@ class Progress:
         self._live = Live(console=self._console, auto_refresh=False, transient=True)
         self._last_line = time.monotonic()
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> ProgressTable:
         if not self._quiet and self._console.is_terminal:
             self._live.start()
             self._live.update(f"starting {', '.join(self._dataflow.nodes)} ...", refresh=True)
@@ -72,10 +72,10 @@ class Progress:
         return table
 
     def _is_slow(self, name: str, health: Health) -> bool:
-        if self._dataflow.context.lossless:  # a replay goes as fast as it can; no rate is expected of it
+        if self._dataflow.context.lossless:  # a replay has no rate to keep
             return False
-        wanted = max((TOPICS[kind].rate_hz for kind in self._dataflow.nodes[name].outputs), default=0.0)
-        return health.rate_hz < MIN_RATE_SHARE * wanted
+        expected_hz = max((TOPICS[kind].rate_hz for kind in self._dataflow.nodes[name].outputs), default=0.0)
+        return health.rate_hz < MIN_RATE_SHARE * expected_hz
 
     def print_summary(self, summary: dict[str, Any]) -> None:
         """Numbers of the whole run, on standard output."""
@@ -85,9 +85,9 @@ class Progress:
             times = f"{n['p50_ms']:.1f}", f"{n['p95_ms']:.1f}"
             table.add_row(name, str(n["steps"]), *times, str(n["drops"]), _megabytes(n["memory_mb"]))
         console.print(table)
-        kept = f" ({_counted(summary['keyframes'], 'keyframe')}, {summary['untrusted_poses']} untrusted)"
+        details = f" ({_counted(summary['keyframes'], 'keyframe')}, {summary['untrusted_poses']} untrusted)"
         console.print(
-            f"{_counted(summary['frames'], 'frame')}{kept if 'pose' in summary['nodes'] else ''}"
+            f"{_counted(summary['frames'], 'frame')}{details if 'pose' in summary['nodes'] else ''}"
             f" in {summary['mapping_s']} s: {summary['frames_per_s']} frames per second; start {summary['start_s']} s"
         )
         if summary["trajectory"]:
@@ -99,14 +99,12 @@ class Progress:
 
 
 def _megabytes(memory_mb: float) -> str:
-    return f"{memory_mb:.0f}" if memory_mb else "-"  # inline: one process for all nodes, so none has a share
+    return f"{memory_mb:.0f}" if memory_mb else "-"  # inline, all nodes share one process
 
 
 def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def _right(title: str) -> Any:
-    from rich.table import Column
-
+def _right(title: str) -> Column:
     return Column(title, justify="right")

@@ -1,6 +1,7 @@
 import numpy as np
 
-from placegraph.tools.bench.map_growth import NAMES, VIEWS, drawing, grow, p95_by_floor, room, views
+from placegraph.tools.bench.box_building import NAMES, VIEWS, room, views
+from placegraph.tools.bench.map_growth import drawing, grow, p95_by_floor
 
 
 def test_furniture_stands_in_its_room_and_apart():
@@ -24,7 +25,7 @@ def test_every_view_is_valid_and_shows_something():
 
 def test_a_small_building_is_mapped_and_drawn():
     samples = grow(2, 2)
-    assert len(samples) == 4 * VIEWS and sum(one.gave for one in samples) >= 2
+    assert len(samples) == 4 * VIEWS and sum(one.with_map for one in samples) >= 2
     assert len(p95_by_floor(samples)) == 2 and min(one.fusion_ms for one in samples) > 0
     text = drawing(samples, 2)
     assert text.count("<circle") == len(samples) and text.startswith("<svg") and text.endswith("</svg>\n")

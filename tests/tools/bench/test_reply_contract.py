@@ -1,4 +1,4 @@
-"""2,000 hostile requests to the desk and the node; and whether a broken reply would be noticed."""
+"""2,000 hostile requests to the query server and the node; and whether a broken reply would be noticed."""
 
 import json
 import re

@@ -12,8 +12,9 @@ from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import inverse, transform
 from placegraph.tools.evaluate.aligned_map import read_aligned_map
 from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY, MIN_FRAMES, house_ground_truth, visibility_of
-from placegraph.tools.map_files.map_folder import read_object_clouds, write_trajectory
+from placegraph.tools.map_files.map_folder import read_object_clouds
 from placegraph.tools.map_files.ply import write_points
+from placegraph.tools.map_files.trajectory_file import write_trajectory
 from placegraph.tools.simulator.build import build
 from placegraph.tools.simulator.classes import CLASSES
 from placegraph.tools.simulator.export import HouseOrder, export

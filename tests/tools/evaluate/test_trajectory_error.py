@@ -17,7 +17,7 @@ from placegraph.tools.evaluate.trajectory_error import (
     relative_pose_error,
     trajectory_scores,
 )
-from placegraph.tools.map_files.map_folder import write_trajectory
+from placegraph.tools.map_files.trajectory_file import write_trajectory
 
 MOTION = np.eye(4)
 MOTION[:3, :3] = Rotation.from_euler("z", 0.7).as_matrix()

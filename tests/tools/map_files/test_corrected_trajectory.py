@@ -1,7 +1,7 @@
 import numpy as np
 
 from placegraph.runtime.messages import Correction, Pose
-from placegraph.tools.map_files.corrected_trajectory import CorrectedKeyframes
+from placegraph.tools.map_files.corrected_trajectory import CorrectedTrajectory
 
 
 def at(x: float) -> np.ndarray:
@@ -32,11 +32,11 @@ def xs(poses: list[Pose]) -> list[float]:
 
 def test_without_corrections_poses_are_as_they_are() -> None:
     poses = [pose(0, 0.0), pose(1, 1.0)]
-    assert CorrectedKeyframes().correct(poses) == poses and CorrectedKeyframes().correct([]) == []
+    assert CorrectedTrajectory().correct(poses) == poses and CorrectedTrajectory().correct([]) == []
 
 
 def test_a_pose_moves_with_the_keyframe_before_it_and_the_first_ones_with_the_first() -> None:
-    corrected = CorrectedKeyframes()
+    corrected = CorrectedTrajectory()
     corrected.add(correction(1, 1.5))
     corrected.add(correction(3, 3.0, {1: 1.1}))
     poses = [pose(i, float(i)) for i in range(5)]
@@ -44,6 +44,6 @@ def test_a_pose_moves_with_the_keyframe_before_it_and_the_first_ones_with_the_fi
 
 
 def test_corrections_of_frames_without_a_pose_are_left_out() -> None:
-    corrected = CorrectedKeyframes()
+    corrected = CorrectedTrajectory()
     corrected.add(correction(7, 9.0))
     assert xs(corrected.correct([pose(0, 2.0)])) == [2.0]

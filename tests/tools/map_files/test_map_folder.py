@@ -9,20 +9,19 @@ from placegraph.runtime.errors import ConfigError, SchemaError
 from placegraph.runtime.messages import End, Graph, LastKeyframe, Map, Pose
 from placegraph.runtime.node import Context, build_node
 from placegraph.tools.map_files.map_folder import (
-    Collector,
     find_graph,
+    make_empty_folder,
     next_folder,
-    prepare,
     read_cloud,
     read_config,
     read_object_clouds,
     read_run,
-    read_trajectory,
-    retired,
+    retired_objects,
     write_run,
-    write_trajectory,
 )
 from placegraph.tools.map_files.ply import write_points
+from placegraph.tools.map_files.trajectory_file import read_trajectory, write_trajectory
+from placegraph.tools.run.map_collector import MapCollector
 
 START = {"camera": {"source": "flat"}, "pose": {"method": "given"}, "keyframe": {}}
 MAPPING = START | {"instances": {"model": "drawn_scene"}, "fusion": {}, "hierarchy": {}}
@@ -91,13 +90,13 @@ def test_a_trajectory_that_cannot_be_read(tmp_path) -> None:
 
 
 def test_prepare_makes_or_takes_an_empty_folder_only(tmp_path) -> None:
-    prepare(tmp_path / "a" / "b")
-    prepare(tmp_path / "a" / "b")
+    make_empty_folder(tmp_path / "a" / "b")
+    make_empty_folder(tmp_path / "a" / "b")
     with pytest.raises(ConfigError, match=r"/a: exists and is not an empty folder"):
-        prepare(tmp_path / "a")
+        make_empty_folder(tmp_path / "a")
     (tmp_path / "file").write_text("")
     with pytest.raises(ConfigError, match=r"/file: exists and is not an empty folder"):
-        prepare(tmp_path / "file")
+        make_empty_folder(tmp_path / "file")
 
 
 def test_the_next_folder_is_the_first_number_that_is_free(tmp_path) -> None:
@@ -140,7 +139,7 @@ def test_no_run_json(tmp_path) -> None:
     ids=["no graph", "no names", "names"],
 )
 def test_complete_when_the_last_of_a_run_has_come(tmp_path, nodes, messages) -> None:
-    collector = Collector(build(flow(nodes)))
+    collector = MapCollector(build(flow(nodes)))
     for message in (pose(0), graph(final=False, named=True), graph(final=False, named=False)):
         collector.add(message)
     assert not collector.complete
@@ -153,7 +152,7 @@ def test_complete_when_the_last_of_a_run_has_come(tmp_path, nodes, messages) -> 
 
 
 def test_frames_are_those_the_source_gave_or_of_a_recording_those_with_a_pose(tmp_path) -> None:
-    collector = Collector(build(flow(START)))
+    collector = MapCollector(build(flow(START)))
     assert collector.frames == 0
     collector.add(pose(0))
     assert collector.frames == 1
@@ -162,7 +161,7 @@ def test_frames_are_those_the_source_gave_or_of_a_recording_those_with_a_pose(tm
 
 
 def test_without_a_map_only_the_trajectory_is_written(tmp_path) -> None:
-    collector = Collector(build(flow(START)))
+    collector = MapCollector(build(flow(START)))
     collector.add(pose(0))
     collector.write(tmp_path / "map")
     assert [path.name for path in (tmp_path / "map").iterdir()] == ["trajectory.txt"]
@@ -181,7 +180,7 @@ def test_points_without_what_a_map_needs_are_named(tmp_path) -> None:
 
 def test_what_has_gone_is_listed_with_when_it_was_seen() -> None:
     empty = make_map()
-    assert retired(empty) == []
+    assert retired_objects(empty) == []
     gone = dataclasses.replace(
         empty,
         retired_ids=np.array([4]),
@@ -193,7 +192,7 @@ def test_what_has_gone_is_listed_with_when_it_was_seen() -> None:
         retired_tag_offsets=np.array([0, 2]),
     )
     gone.check()
-    assert retired(gone) == [
+    assert retired_objects(gone) == [
         {
             "id": "O4",
             "tags": [["chair", 2.0], ["stool", 0.5]],

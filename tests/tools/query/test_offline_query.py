@@ -5,7 +5,7 @@ import pytest
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.query.reply import Reply
 from placegraph.runtime.query.request import make_question
-from placegraph.tools.query.offline_query import KEPT, OfflineQuery, in_own_ids
+from placegraph.tools.query.offline_query import MAX_OPEN_FILES, OfflineQuery, with_own_ids
 
 FAST = {"use_model": False, "name_places": False}
 
@@ -29,7 +29,7 @@ def test_a_map_folder_and_its_graph_file_answer_alike(answerer, mapped) -> None:
 
 
 def test_each_file_is_answered_from_its_own_graph_and_ids(answerer, tmp_path) -> None:
-    paths = [tmp_path / f"{i}.json" for i in range(KEPT + 2)]
+    paths = [tmp_path / f"{i}.json" for i in range(MAX_OPEN_FILES + 2)]
     for i, path in enumerate(paths):
         path.write_text(chairs([100 + i]))
     for _ in range(2):
@@ -55,10 +55,10 @@ def test_own_ids_stand_in_sentences_too() -> None:
         "evidence": ["chair O1 is 0.5 m from chair O11, not O9", "looked in hall: hall R1", "CO1 and O01 are no ids"],
         "candidates": [{"id": "O1", "evidence": ["O1"], "score": 1.0}],
     }
-    own = in_own_ids(reply, {"O1": 7, "O11": "a\\1", "R1": "hall 2"})
+    own = with_own_ids(reply, {"O1": 7, "O11": "a\\1", "R1": "hall 2"})
     assert own["evidence"] == [
         "chair 7 is 0.5 m from chair a\\1, not O9", "looked in hall: hall hall 2", "CO1 and O01 are no ids"
     ]  # fmt: skip
     assert own["candidates"] == [{"id": 7, "evidence": ["7"], "score": 1.0}]
     assert (own["object_id"], own["route"]) == (None, ["hall 2", "C2"])
-    assert in_own_ids(reply, {}) is reply
+    assert with_own_ids(reply, {}) is reply

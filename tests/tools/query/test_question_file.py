@@ -11,7 +11,7 @@ import pytest
 
 from placegraph.runtime.errors import ConfigError, QueryError
 from placegraph.tools.query.offline_query import OfflineQuery
-from placegraph.tools.query.question_file import Batch, answer_all
+from placegraph.tools.query.question_file import LineAnswerer, answer_all
 
 FAST = {"use_model": False, "name_places": False}
 ROOM = {
@@ -38,7 +38,7 @@ def run(tmp_path, lines, graph, **options):
     questions, out = tmp_path / "q.jsonl", tmp_path / "a.jsonl"
     questions.write_bytes(b"\n".join(line if isinstance(line, bytes) else json.dumps(line).encode() for line in lines))
     with OfflineQuery(FAST) as answerer:
-        tally = answer_all(Batch(answerer, tmp_path, graph, **{"mode": "rules"} | options), questions, out)
+        tally = answer_all(LineAnswerer(answerer, tmp_path, graph, **{"mode": "rules"} | options), questions, out)
     answers = [json.loads(line) for line in out.read_text().splitlines()]
     assert all(set(answer) == KEYS for answer in answers) and len(tally.ms) == len(answers)
     assert not out.with_name("a.jsonl.partial").exists()
@@ -128,13 +128,13 @@ def test_an_empty_list_has_nothing_in_it(tmp_path) -> None:
 def test_files_that_cannot_be_read_or_written(tmp_path, room) -> None:
     questions = tmp_path / "q.jsonl"
     with OfflineQuery(FAST) as answerer:
-        batch = Batch(answerer, tmp_path, room)
+        batch = LineAnswerer(answerer, tmp_path, room)
         with pytest.raises(QueryError, match=r"q\.jsonl: cannot read"):
             answer_all(batch, questions, tmp_path / "a.jsonl")
         questions.write_text("")
         with pytest.raises(ConfigError, match=r"a\.jsonl: cannot write"):
             answer_all(batch, questions, tmp_path / "absent" / "a.jsonl")
-        assert answer_all(batch, questions, tmp_path / "a.jsonl").in_words().startswith("0 questions: 0 found")
+        assert answer_all(batch, questions, tmp_path / "a.jsonl").text().startswith("0 questions: 0 found")
     assert (tmp_path / "a.jsonl").read_text() == ""
 
 
@@ -142,7 +142,7 @@ def test_a_thousand_questions_leave_no_memory_behind(tmp_path, room) -> None:
     texts = ["the chair next to the table", "the piano", "the red chair", "the second chair from the left", ""]
     memory, process = [], psutil.Process()
     with OfflineQuery(FAST) as answerer:
-        batch = Batch(answerer, tmp_path, room, mode="rules")
+        batch = LineAnswerer(answerer, tmp_path, room, mode="rules")
         for n in range(1200):
             line = {"id": n, "text": f"{texts[n % 5]} {n}" if n % 2 else texts[n % 5], "pose": [n % 7, 0, 1]}
             batch.answer(n, json.dumps(line).encode())

@@ -8,7 +8,13 @@ import pytest
 from placegraph.nodes.hierarchy.floors import FloorConfig
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.tools.map_files.ply import write_points
-from placegraph.tools.rooms.point_cloud import EYE_M, floors_of_scan, read_scan, standpoints, thinned
+from placegraph.tools.rooms.point_cloud import (
+    EYE_HEIGHT_M,
+    floors_of_cloud,
+    read_point_cloud,
+    standpoints,
+    voxel_centroids,
+)
 
 STEP_M = 0.04
 Range = tuple[float, float]
@@ -47,20 +53,20 @@ def heights(floors: list) -> list[list[float]]:
 
 @pytest.mark.parametrize("ceiling", [True, False])
 def test_two_floors_with_two_rooms_each(ceiling: bool) -> None:
-    floors = floors_of_scan(np.concatenate(storey(0.0) + storey(2.8, ceiling=ceiling)), 0.05)
+    floors = floors_of_cloud(np.concatenate(storey(0.0) + storey(2.8, ceiling=ceiling)), 0.05)
     np.testing.assert_allclose(heights(floors), [[0, 2.5], [2.8, 5.3]], atol=0.05)
     np.testing.assert_allclose(areas(floors), [[20, 12], [20, 12]], rtol=0.1)
 
 
 def test_an_upper_floor_that_covers_half_of_the_lower_one_is_one() -> None:
     upper = [points[points[:, 0] > 4.9] for points in storey(2.8)]
-    floors = floors_of_scan(np.concatenate(storey(0.0) + upper), 0.05)
+    floors = floors_of_cloud(np.concatenate(storey(0.0) + upper), 0.05)
     np.testing.assert_allclose(heights(floors), [[0, 2.5], [2.8, 5.3]], atol=0.05)
 
 
 def test_neither_foundations_nor_a_roof_nor_tables_are_floors() -> None:
     slabs = [sheet((0, 8), (0, 4), (z, z)) for z in (-0.3, 2.8)]
-    floors = floors_of_scan(np.concatenate(storey(0.0) + slabs), 0.05)
+    floors = floors_of_cloud(np.concatenate(storey(0.0) + slabs), 0.05)
     np.testing.assert_allclose(heights(floors), [[0, 2.5]], atol=0.35)  # the roof may be taken for the ceiling
     assert floors[0].span.low == pytest.approx(0, abs=0.05)
 
@@ -68,7 +74,7 @@ def test_neither_foundations_nor_a_roof_nor_tables_are_floors() -> None:
 def test_the_order_of_the_points_changes_nothing() -> None:
     points = np.concatenate(storey(0.0) + storey(2.8))
     shuffled = np.random.default_rng(0).permutation(points)
-    for one, other in zip(floors_of_scan(points, 0.05), floors_of_scan(shuffled, 0.05), strict=True):
+    for one, other in zip(floors_of_cloud(points, 0.05), floors_of_cloud(shuffled, 0.05), strict=True):
         assert heights([one]) == [pytest.approx(heights([other])[0])]
         assert [room.outline.tolist() for room in one.rooms] == [room.outline.tolist() for room in other.rooms]
 
@@ -86,19 +92,19 @@ def test_the_order_of_the_points_changes_nothing() -> None:
     ids=["noise", "one point", "one place", "a level", "a wall", "stairs"],
 )
 def test_odd_clouds_have_one_floor_with_a_room(points: np.ndarray) -> None:
-    floors = floors_of_scan(points, 0.05)
+    floors = floors_of_cloud(points, 0.05)
     assert len(floors) == 1 and len(floors[0].rooms) >= 1
     assert np.isfinite(heights(floors)).all() and floors[0].span.low <= floors[0].span.high
 
 
 def test_people_stand_on_floors_only() -> None:
-    eyes = standpoints(thinned(np.concatenate(storey(0.0) + storey(2.8)), 0.05), FloorConfig())
-    assert set(np.round(eyes[:, 2] - EYE_M, 1)) == {0.0, 2.8}
+    eyes = standpoints(voxel_centroids(np.concatenate(storey(0.0) + storey(2.8)), 0.05), FloorConfig())
+    assert set(np.round(eyes[:, 2] - EYE_HEIGHT_M, 1)) == {0.0, 2.8}
 
 
 def test_thinned_points_are_the_middles_of_their_voxels() -> None:
     points = np.array([[0, 0, 0], [0.02, 0, 0.04], [0.2, 0, 0]])
-    np.testing.assert_allclose(thinned(points, 0.05), [[0.01, 0, 0.02], [0.2, 0, 0]])
+    np.testing.assert_allclose(voxel_centroids(points, 0.05), [[0.01, 0, 0.02], [0.2, 0, 0]])
 
 
 @pytest.mark.parametrize(
@@ -111,17 +117,17 @@ def test_thinned_points_are_the_middles_of_their_voxels() -> None:
 def test_clouds_of_no_building_are_named(tmp_path: Path, points: np.ndarray, text: str) -> None:
     write_points(tmp_path / "a.ply", points, {})
     with pytest.raises(SourceError, match=rf"a\.ply: {text}"):
-        read_scan(tmp_path / "a.ply")
+        read_point_cloud(tmp_path / "a.ply")
 
 
 @pytest.mark.parametrize("cell_m", [0.0, -0.05, float("nan"), float("inf"), 1e-5])
 def test_a_cell_of_no_use_is_named(cell_m: float) -> None:
     with pytest.raises(ConfigError, match=r"--resolution: .*(not a positive length|more than 10000 a side)"):
-        floors_of_scan(np.array([[0, 0, 0], [1, 0, 0.0]]), cell_m)
+        floors_of_cloud(np.array([[0, 0, 0], [1, 0, 0.0]]), cell_m)
 
 
 @pytest.mark.parametrize("cell_m", [0.02, 0.3, 3.0])
 def test_fine_and_coarse_cells_find_the_same_floors(cell_m: float) -> None:
-    floors = floors_of_scan(np.concatenate(storey(0.0) + storey(2.8)), cell_m)
+    floors = floors_of_cloud(np.concatenate(storey(0.0) + storey(2.8)), cell_m)
     np.testing.assert_allclose(heights(floors), [[0, 2.5], [2.8, 5.3]], atol=0.05)
     assert all(floor.rooms for floor in floors)

@@ -90,7 +90,7 @@ def test_wrong_input_is_named(plan: Path) -> None:
         read_map(write_yaml(folder, image="gone.pgm"))
     with pytest.raises(SourceError, match="resolution"):
         read_map(write_yaml(folder, resolution="wide"))
-    with pytest.raises(SourceError, match="turned by"):
+    with pytest.raises(SourceError, match="rotated by"):
         read_map(write_yaml(folder, origin="[0.0, 0.0, 0.5]"))
     broken = folder / "broken.yaml"
     broken.write_text("image: [\n")

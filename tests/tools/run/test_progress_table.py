@@ -7,7 +7,7 @@ from rich.console import Console
 from placegraph.runtime.config import RunConfig, RunSettings, build
 from placegraph.runtime.messages import Health
 from placegraph.tools.run import progress_table as module
-from placegraph.tools.run.progress_table import Progress
+from placegraph.tools.run.progress_table import ProgressTable
 
 NODES = {"camera": {"source": "flat"}, "pose": {"method": "given"}}
 
@@ -37,7 +37,7 @@ def styled(progress):
 
 
 def test_the_table_has_a_row_for_each_node_in_order() -> None:
-    progress = Progress(flow(), quiet=False)
+    progress = ProgressTable(flow(), quiet=False)
     progress.add(health())
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in shown(progress).splitlines() if "│" in line]
     assert rows == [["camera", *["-"] * 7], ["pose", "7", "3.2", "1.2", "20.0", "2", "0", "100"]]
@@ -45,13 +45,13 @@ def test_the_table_has_a_row_for_each_node_in_order() -> None:
 
 def test_a_slow_node_is_marked_only_when_live() -> None:
     for live in (False, True):
-        progress = Progress(flow(realtime=live), quiet=False)
+        progress = ProgressTable(flow(realtime=live), quiet=False)
         progress.add(health(rate_hz=0.1))
         assert ("\x1b[33m" in styled(progress)) == live
 
 
 def test_dropped_messages_are_marked() -> None:
-    progress = Progress(flow(), quiet=False)
+    progress = ProgressTable(flow(), quiet=False)
     progress.add(health())
     assert "\x1b[31m" not in styled(progress)
     progress.add(health(drops=3))
@@ -61,7 +61,7 @@ def test_dropped_messages_are_marked() -> None:
 @pytest.mark.parametrize("quiet", [False, True])
 def test_without_a_terminal_a_line_now_and_then(capsys, monkeypatch, quiet) -> None:
     monkeypatch.setattr(module, "PLAIN_PERIOD_S", 0.0)
-    with Progress(flow(), quiet) as progress:
+    with ProgressTable(flow(), quiet) as progress:
         progress.refresh()  # nothing reported yet
         progress.add(health())
         progress.add(health("camera", steps=9))
@@ -73,7 +73,7 @@ def test_without_a_terminal_a_line_now_and_then(capsys, monkeypatch, quiet) -> N
 
 def test_on_a_terminal_it_says_what_is_starting_then_shows_the_table_and_leaves_nothing(capsys, monkeypatch) -> None:
     monkeypatch.setattr(module, "Console", functools.partial(Console, force_terminal=True, width=100))
-    with Progress(flow(), quiet=False) as progress:
+    with ProgressTable(flow(), quiet=False) as progress:
         assert "starting camera, pose " in capsys.readouterr().err
         progress.add(health())
         progress.refresh()
@@ -84,7 +84,7 @@ def test_on_a_terminal_it_says_what_is_starting_then_shows_the_table_and_leaves_
 
 
 def test_not_more_than_a_line_each_period(capsys) -> None:
-    with Progress(flow(), quiet=False) as progress:
+    with ProgressTable(flow(), quiet=False) as progress:
         progress.add(health())
         progress.refresh()
     assert capsys.readouterr().err == ""
@@ -92,7 +92,7 @@ def test_not_more_than_a_line_each_period(capsys) -> None:
 
 def test_what_is_said_stays_one_line_as_it_is(capsys) -> None:
     text = "[bus] " + "a path/" * 30
-    Progress(flow(), quiet=True).say(text)
+    ProgressTable(flow(), quiet=True).say(text)
     assert capsys.readouterr().err == text + "\n"
 
 
@@ -106,7 +106,7 @@ def test_the_summary_keeps_whole_lines(capsys, monkeypatch, columns) -> None:
         "trajectory": {"ate_rmse_m": 0.01, "ate_max_m": 0.02, "poses": 5, "path_m": 3.0},
         "graph": {"floor": 1, "room": 2, "location": 0, "object": 1},
     }  # fmt: skip
-    Progress(flow(), quiet=False).print_summary(summary)
+    ProgressTable(flow(), quiet=False).print_summary(summary)
     out = capsys.readouterr().out
     cells = [[cell.strip() for cell in line.split("│")[1:-1]] for line in out.splitlines() if "│" in line]
     assert cells == [["camera", "5", "1.2", "10.0", "0", "-"], ["pose", "5", "1.2", "10.0", "0", "120"]]
@@ -122,7 +122,7 @@ def test_a_summary_without_truth_or_graph(capsys) -> None:
         "frames": 0, "keyframes": 0, "untrusted_poses": 0, "start_s": 0.0, "mapping_s": 0.0, "frames_per_s": 0.0,
         "nodes": {}, "trajectory": None,
     }  # fmt: skip
-    Progress(flow(), quiet=False).print_summary(summary)
+    ProgressTable(flow(), quiet=False).print_summary(summary)
     out = capsys.readouterr().out
     assert out.splitlines()[-1] == "0 frames in 0.0 s: 0.0 frames per second; start 0.0 s"
     assert "keyframe" not in out and "trajectory" not in out and "graph" not in out

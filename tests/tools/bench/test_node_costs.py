@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import PlacegraphError
-from placegraph.tools import bench as tool
-from placegraph.tools.bench import Cost
+from placegraph.tools import bench as command
+from placegraph.tools.bench import node_costs as tool
+from placegraph.tools.bench.node_costs import Cost
 
 
 @pytest.fixture(scope="module")
@@ -88,10 +89,10 @@ def test_the_table_is_aligned():
 
 
 def test_it_prints_a_table_or_json(capsys, monkeypatch):
-    monkeypatch.setattr(tool, "measure", lambda: [Cost("a", 3.0, "b", 2.0)])
-    tool.bench()
+    monkeypatch.setattr(command, "measure", lambda: [Cost("a", 3.0, "b", 2.0)])
+    command.bench()
     assert capsys.readouterr().out.splitlines()[1].split() == ["a", "3.000", "b", "2.000", "1.50"]
-    tool.bench(as_json=True)
+    command.bench(as_json=True)
     expected = {"part": "a", "ms": 3.0, "baseline": "b", "baseline_ms": 2.0, "ratio": 1.5}
     assert json.loads(capsys.readouterr().out) == [expected]
 
