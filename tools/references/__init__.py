@@ -15,7 +15,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.inline import Inline
 from placegraph.runtime.messages import Message, Question
 from placegraph.runtime.node import Context, Node, build_node
-from placegraph.tools.references.recorded_steps import Reference, differences, language_model_replies, summary
+from placegraph.tools.references.recorded_steps import ReferenceRecording, differences, language_model_replies, summary
 from placegraph.tools.run import with_settings
 
 FOLDER = Path(__file__).parents[2] / "tests" / "replay"
@@ -97,7 +97,7 @@ def _run_and_ask(shell: Inline) -> None:
     _feed(shell, [Question(question_id=f"q{i}", text=text, **rest) for i, text in enumerate(QUESTIONS)])
 
 
-def make() -> Reference:
+def make() -> ReferenceRecording:
     """Run the drawn scene through every node, with the language model; the same code gives the same reference."""
     replies: dict[str, Any] = {}
     walk, house = _part_of_flat(WALK, "fusion", "hierarchy", "grounding"), _part_of_flat(HOUSE)
@@ -116,7 +116,7 @@ def make() -> Reference:
         for name, tap in taps.items()
     }
     settings = {name: tap.config.model_dump(mode="json", exclude_unset=True) for name, tap in taps.items()}
-    return Reference(settings, list(messages.values()), steps, replies)
+    return ReferenceRecording(settings, list(messages.values()), steps, replies)
 
 
 def references(
@@ -137,7 +137,7 @@ def references(
         (folder / SUMMARY).write_text(summary(reference), encoding="utf-8")
         print(f"{len(reference.messages)} messages, {(folder / RECORDING).stat().st_size / 1e6:.2f} MB in {folder}")
         return
-    reference = Reference.read(folder / RECORDING)
+    reference = ReferenceRecording.read(folder / RECORDING)
     found = {name: differences(reference, name) for name in reference.steps}
     for name, lines in found.items():
         print(f"{name:<10} {len(reference.steps[name]):>4} steps  {'differs' if lines else 'as recorded'}")

@@ -1,4 +1,4 @@
-"""Steps of nodes kept in a file: messages taken and given, the language model's replies, and how to compare them."""
+"""A reference recording: the inputs and outputs of nodes, step by step, and the language model's replies."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from placegraph.runtime.node import Context, build_node
 
 REMAKE = "`placegraph references --update` remakes it"
 
-# Integers, names and order are exact: taken messages are the recorded ones bit by bit, so only the last bits of a sum
-# can differ between machines. KISS-ICP stops when a step is under 1e-4, and one step more or less moves a pose so far.
+# Integers, names and order must be equal: the inputs are the recorded ones bit by bit, so only the last bits of a sum
+# can differ between machines. KISS-ICP stops when a step is below 1e-4, and one step more or less moves a pose by that.
 TOLERANCE = 1e-3  # m, px, rad, shares
 JSON_LENGTH_TOLERANCE_M = 2e-3  # the canonical JSON rounds to 1 mm, which can add one step to TOLERANCE
 MAX_REPORTED = 5  # of one node
 
 
 @dataclass(frozen=True, repr=False)
-class Reference:
-    """One run: `steps` of each node as (index of the message taken, indices of those given, in order)."""
+class ReferenceRecording:
+    """One run: the steps of each node as (index of the input message, indices of its outputs in order)."""
 
     settings: dict[str, dict[str, Any]]
     messages: list[Message]
@@ -47,32 +47,32 @@ class Reference:
         path.write_bytes(lzma.compress(data, preset=9))
 
     @classmethod
-    def read(cls, path: Path) -> Reference:
-        """Read what `write` wrote; raises SchemaError, also when a message was declared otherwise then."""
+    def read(cls, path: Path) -> ReferenceRecording:
+        """Read what `write` wrote; raises SchemaError, also when a message's declaration has changed since."""
         try:
             settings, packed, steps, replies = msgpack.unpackb(lzma.decompress(path.read_bytes()))
-            found = [decode(getattr(m, kind), payload) for kind, payload in packed]
+            messages = [decode(getattr(m, kind), payload) for kind, payload in packed]
         except SchemaError as error:
             raise SchemaError(f"{path}: {error}; {REMAKE}") from None
         except (OSError, lzma.LZMAError, ValueError, TypeError, AttributeError, msgpack.UnpackException) as error:
             raise SchemaError(f"{path}: not a reference: {error or type(error).__name__}; {REMAKE}") from None
-        return cls(settings, found, {n: [(i, list(given)) for i, given in rows] for n, rows in steps.items()}, replies)
+        return cls(settings, messages, {n: [(i, list(outs)) for i, outs in rows] for n, rows in steps.items()}, replies)
 
 
 @contextmanager
 def language_model_replies(replies: dict[str, Any], ask: bool) -> Iterator[None]:
-    """Cut at the language model: `ask` it and keep its replies, or give the kept ones without loading it.
+    """Replace the language model: with `ask` keep its replies, without it give the kept ones and do not load it.
 
     Without `ask` a call that was not kept raises SchemaError: a prompt, a grammar or a list of options has changed.
     """
-    kept = {name: getattr(LanguageModel, name) for name in ("load", "complete", "log_probabilities")}
+    methods = {name: getattr(LanguageModel, name) for name in ("load", "complete", "log_probabilities")}
 
-    def cut(name: str) -> Callable[..., Any]:
+    def replacement(name: str) -> Callable[..., Any]:
         def reply(self: LanguageModel, *arguments: Any, **named: Any) -> Any:
             key = json.dumps([name, *arguments, *([named] if named else [])], ensure_ascii=False)
             if ask:
-                found = kept[name](self, *arguments, **named)
-                replies[key] = asdict(found) if isinstance(found, Reply) else found.tolist()
+                result = methods[name](self, *arguments, **named)
+                replies[key] = asdict(result) if isinstance(result, Reply) else result.tolist()
             elif key not in replies:
                 raise SchemaError(f"the reference holds no reply of the language model to {_short(key)}; {REMAKE}")
             else:
@@ -83,54 +83,54 @@ def language_model_replies(replies: dict[str, Any], ask: bool) -> Iterator[None]
 
     try:
         for name in ("complete", "log_probabilities"):
-            setattr(LanguageModel, name, cut(name))
+            setattr(LanguageModel, name, replacement(name))
         if not ask:
             LanguageModel.load = lambda self: None  # type: ignore[method-assign]
         yield
     finally:
-        for name, method in kept.items():
+        for name, method in methods.items():
             setattr(LanguageModel, name, method)
 
 
-def differences(reference: Reference, name: str, **changed: Any) -> list[str]:
-    """Step a fresh node through its reference; where what it gives is not what it gave, at most MAX_REPORTED lines.
+def differences(reference: ReferenceRecording, name: str, **changed: Any) -> list[str]:
+    """Step a fresh node through its reference; returns where its outputs differ, at most MAX_REPORTED lines.
 
-    `changed` settings replace the recorded ones. An error of ours is a difference; it ends the node's steps.
+    `changed` settings replace the recorded ones. A PlacegraphError is a difference, too; it ends the node's steps.
     """
-    kinds = {type(reference.messages[taken]).__name__ for taken, _ in reference.steps[name]}
+    kinds = {type(reference.messages[i]).__name__ for i, _ in reference.steps[name]}
     node = build_node(name, reference.settings[name] | changed, Context(given=tuple(sorted(kinds))))
-    found: list[str] = []
+    lines: list[str] = []
     with language_model_replies(reference.replies, ask=False):
         try:
             node.start()
-            for taken, given in reference.steps[name]:
-                message = reference.messages[taken]
+            for input_index, output_indices in reference.steps[name]:
+                message = reference.messages[input_index]
                 where = f"{name}: {type(message).__name__} of frame {message.frame_id}"
-                found += _step_differences(where, [reference.messages[i] for i in given], node.step(message))
-                if len(found) >= MAX_REPORTED:
+                lines += _step_differences(where, [reference.messages[i] for i in output_indices], node.step(message))
+                if len(lines) >= MAX_REPORTED:
                     break
         except PlacegraphError as error:
-            found.append(f"{name}: {type(error).__name__}: {error}")
+            lines.append(f"{name}: {type(error).__name__}: {error}")
         finally:
             node.stop()
-    return found[:MAX_REPORTED]
+    return lines[:MAX_REPORTED]
 
 
-def _step_differences(where: str, expected: Sequence[Message], given: Sequence[Message]) -> list[str]:
-    kinds = [[type(message).__name__ for message in side] for side in (expected, given)]
+def _step_differences(where: str, expected: Sequence[Message], outputs: Sequence[Message]) -> list[str]:
+    kinds = [[type(message).__name__ for message in side] for side in (expected, outputs)]
     if kinds[0] != kinds[1]:
         return [f"{where} gave {kinds[0]}, gives {kinds[1]}"]
-    found = []
-    for old, new in zip(expected, given, strict=True):
+    lines = []
+    for old, new in zip(expected, outputs, strict=True):
         new.check()
         for name in (*old.array_specs(), *old.scalar_types()):
             text = _field_difference(getattr(old, name), getattr(new, name), is_json=name == "json")
-            found += [f"{where} gives {type(old).__name__}({old.frame_id}).{name}{text}"] if text else []
-    return found
+            lines += [f"{where} gives {type(old).__name__}({old.frame_id}).{name}{text}"] if text else []
+    return lines
 
 
 def _field_difference(old: Any, new: Any, is_json: bool) -> str:
-    """Empty when equal within the tolerance, else the rest of a sentence."""
+    """The end of a sentence about a difference; empty when equal within the tolerance."""
     if is_json:
         return next(_json_differences(json.loads(old), json.loads(new), JSON_LENGTH_TOLERANCE_M), "")
     if isinstance(old, float):
@@ -158,9 +158,9 @@ def _json_differences(old: Any, new: Any, tolerance: float, where: str = "") -> 
         for key, value in old.items():
             yield from _json_differences(value, new[key], TOLERANCE if key == "tags" else tolerance, f"{where}.{key}")
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for i, (one, other) in enumerate(zip(old, new, strict=True)):
-            label = one["id"] if isinstance(one, dict) and "id" in one else i
-            yield from _json_differences(one, other, tolerance, f"{where}[{label}]")
+        for i, (a, b) in enumerate(zip(old, new, strict=True)):
+            label = a["id"] if isinstance(a, dict) and "id" in a else i
+            yield from _json_differences(a, b, tolerance, f"{where}[{label}]")
     elif type(old) is not type(new) or old != new:
         yield f"{where}: was {_short(old)}, is {_short(new)}"
 
@@ -170,29 +170,27 @@ def _short(value: Any) -> str:
     return text if len(text) <= 100 else f"{text[:97]}..."
 
 
-def summary(reference: Reference) -> str:
-    """What a person compares: each step on a line with rounded values, every answer and the last graph as JSON."""
+def summary(reference: ReferenceRecording) -> str:
+    """The recording as text for review: each step on a line with rounded values, all answers and the last graph."""
     lines: list[str] = []
     for name, steps in reference.steps.items():
         lines += [f"== {name} {json.dumps(reference.settings[name], sort_keys=True)}"]
-        for taken, given in steps:
-            message = reference.messages[taken]
-            results = [reference.messages[i] for i in given]
+        for input_index, output_indices in steps:
+            message = reference.messages[input_index]
             head = f"{type(message).__name__} {message.frame_id} ->"
-            lines += [f"{head} {_line(result)}" for result in results] or [f"{head} nothing"]
+            lines += [f"{head} {_line(reference.messages[i])}" for i in output_indices] or [f"{head} nothing"]
     for message in reference.messages:
         if isinstance(message, m.Answer):
             lines += [f"== answer {message.question_id}", _indented(message.json)]
-    graphs = [message for message in reference.messages if isinstance(message, m.Graph)][-1:]
-    for message in graphs:
+    for message in [message for message in reference.messages if isinstance(message, m.Graph)][-1:]:
         lines += ["== the last graph", _indented(message.json)]
     return "\n".join([*lines, ""])
 
 
 def _indented(text: str) -> str:
-    spread = json.dumps(json.loads(text), indent=1, sort_keys=True, ensure_ascii=False)
+    indented = json.dumps(json.loads(text), indent=1, sort_keys=True, ensure_ascii=False)
     # numbers of a list on one line, so that a diff shows what moved
-    return re.sub(r"\[[^][{}]*\]", lambda found: " ".join(found[0].split()), spread)
+    return re.sub(r"\[[^][{}]*\]", lambda match: " ".join(match[0].split()), indented)
 
 
 def _line(message: Message) -> str:

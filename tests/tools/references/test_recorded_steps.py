@@ -12,7 +12,7 @@ from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.language.language_model import LanguageModel, Reply
 from placegraph.runtime.messages import Answer, Frame, Graph, Keyframe, Pose
 from placegraph.tools.references.recorded_steps import (
-    Reference,
+    ReferenceRecording,
     _json_differences,
     differences,
     language_model_replies,
@@ -55,21 +55,21 @@ def keyframe(frame_id: int, x_m: float) -> Keyframe:
 
 
 @pytest.fixture
-def reference() -> Reference:
+def reference() -> ReferenceRecording:
     messages = [frame(0), pose(0, 0), keyframe(0, 0), frame(1), pose(1, 0.05), frame(2), pose(2, 0.5), keyframe(2, 0.5)]
     steps = [(0, []), (1, [2]), (3, []), (4, []), (5, []), (6, [7])]
-    return Reference({"keyframe": {"rotation_rad": 0.5}}, messages, {"keyframe": steps}, {})
+    return ReferenceRecording({"keyframe": {"rotation_rad": 0.5}}, messages, {"keyframe": steps}, {})
 
 
-def tampered(reference: Reference, number: int, **fields: Any) -> Reference:
+def tampered(reference: ReferenceRecording, number: int, **fields: Any) -> ReferenceRecording:
     messages = list(reference.messages)
     messages[number] = dataclasses.replace(messages[number], **fields)
     return dataclasses.replace(reference, messages=messages)
 
 
-def test_what_was_written_is_read_back(reference: Reference, tmp_path: Path) -> None:
+def test_what_was_written_is_read_back(reference: ReferenceRecording, tmp_path: Path) -> None:
     reference.write(tmp_path / "x.rec")
-    again = Reference.read(tmp_path / "x.rec")
+    again = ReferenceRecording.read(tmp_path / "x.rec")
     assert (again.settings, again.steps, again.replies) == (reference.settings, reference.steps, reference.replies)
     assert summary(again) == summary(reference)
     assert differences(again, "keyframe") == []
@@ -77,30 +77,30 @@ def test_what_was_written_is_read_back(reference: Reference, tmp_path: Path) -> 
     assert (tmp_path / "y.rec").read_bytes() == (tmp_path / "x.rec").read_bytes()
 
 
-def test_a_file_that_is_absent_or_something_else_is_named(reference: Reference, tmp_path: Path) -> None:
+def test_a_file_that_is_absent_or_something_else_is_named(reference: ReferenceRecording, tmp_path: Path) -> None:
     with pytest.raises(SchemaError, match=r"none\.rec: not a reference: .*--update"):
-        Reference.read(tmp_path / "none.rec")
+        ReferenceRecording.read(tmp_path / "none.rec")
     reference.write(tmp_path / "cut.rec")
     (tmp_path / "cut.rec").write_bytes((tmp_path / "cut.rec").read_bytes()[:-9])
     with pytest.raises(SchemaError, match=r"cut\.rec: not a reference"):
-        Reference.read(tmp_path / "cut.rec")
+        ReferenceRecording.read(tmp_path / "cut.rec")
     (tmp_path / "other.rec").write_bytes(lzma.compress(msgpack.packb([{}, [["NoKind", b""]], {}, {}])))
     with pytest.raises(SchemaError, match=r"other\.rec: not a reference"):
-        Reference.read(tmp_path / "other.rec")
+        ReferenceRecording.read(tmp_path / "other.rec")
 
 
-def test_a_changed_declaration_says_how_to_go_on(reference: Reference, tmp_path: Path, monkeypatch) -> None:
+def test_a_changed_declaration_says_how_to_go_on(reference: ReferenceRecording, tmp_path: Path, monkeypatch) -> None:
     reference.write(tmp_path / "x.rec")
     monkeypatch.setattr(Keyframe, "checksum", classmethod(lambda cls: "00000000"))
     with pytest.raises(SchemaError, match=r"x\.rec: Keyframe: .*versions of placegraph; `placegraph references --upd"):
-        Reference.read(tmp_path / "x.rec")
+        ReferenceRecording.read(tmp_path / "x.rec")
 
 
-def test_a_reference_without_steps_gives_an_empty_list(reference: Reference) -> None:
+def test_a_reference_without_steps_gives_an_empty_list(reference: ReferenceRecording) -> None:
     assert differences(dataclasses.replace(reference, steps={"keyframe": []}), "keyframe") == []
 
 
-def test_a_small_difference_of_a_float_is_allowed_and_a_large_one_is_named(reference: Reference) -> None:
+def test_a_small_difference_of_a_float_is_allowed_and_a_large_one_is_named(reference: ReferenceRecording) -> None:
     matrix = reference.messages[2].world_from_camera
     assert differences(tampered(reference, 2, world_from_camera=matrix + 5e-4), "keyframe") == []
     (line,) = differences(tampered(reference, 2, world_from_camera=matrix + 2e-3), "keyframe")
@@ -111,7 +111,7 @@ def test_a_small_difference_of_a_float_is_allowed_and_a_large_one_is_named(refer
     assert line.endswith("gives Keyframe(0).depth_unit_m: was 0.003, is 0.001")
 
 
-def test_integers_and_shapes_are_exact(reference: Reference) -> None:
+def test_integers_and_shapes_are_exact(reference: ReferenceRecording) -> None:
     color = reference.messages[2].color
     (line,) = differences(tampered(reference, 2, color=color + np.uint8(1)), "keyframe")
     assert "Keyframe(0).color[0, 0, 0]: 18 of 18 values differ, the first was 8, is 7" in line
@@ -121,7 +121,7 @@ def test_integers_and_shapes_are_exact(reference: Reference) -> None:
     assert "Keyframe(0).color: shape was (1, 3, 3), is (2, 3, 3)" in line
 
 
-def test_what_is_given_at_another_step_differs(reference: Reference) -> None:
+def test_what_is_given_at_another_step_differs(reference: ReferenceRecording) -> None:
     steps = [(0, [2]), (1, []), (3, []), (4, []), (5, []), (6, [7])]
     found = differences(dataclasses.replace(reference, steps={"keyframe": steps}), "keyframe")
     assert found == [
@@ -130,17 +130,17 @@ def test_what_is_given_at_another_step_differs(reference: Reference) -> None:
     ]
 
 
-def test_a_changed_setting_and_an_error_of_ours_are_differences(reference: Reference) -> None:
+def test_a_changed_setting_and_an_error_of_ours_are_differences(reference: ReferenceRecording) -> None:
     assert differences(reference, "keyframe", translation_m=0.04) == [
         "keyframe: Pose of frame 1 gave [], gives ['Keyframe']"
     ]
     graph = Graph(frame_id=0, stamp_ns=0, revision=0, final=True, named=False, json="[]")
-    broken = Reference({"grounding": {}}, [graph], {"grounding": [(0, [])]}, {})
+    broken = ReferenceRecording({"grounding": {}}, [graph], {"grounding": [(0, [])]}, {})
     (line,) = differences(broken, "grounding")
     assert line.startswith("grounding: SchemaError: Graph of revision 0: expected graph version")
 
 
-def test_only_the_first_differences_are_listed(reference: Reference) -> None:
+def test_only_the_first_differences_are_listed(reference: ReferenceRecording) -> None:
     steps = [(0, [2])] * 20
     assert len(differences(dataclasses.replace(reference, steps={"keyframe": steps}), "keyframe")) == 5
 
@@ -197,7 +197,7 @@ def test_the_model_is_whole_again_after_an_error() -> None:
     assert (LanguageModel.load, LanguageModel.complete, LanguageModel.log_probabilities) == before
 
 
-def test_the_summary_shows_steps_answers_and_the_graph(reference: Reference) -> None:
+def test_the_summary_shows_steps_answers_and_the_graph(reference: ReferenceRecording) -> None:
     graph = Graph(frame_id=2, stamp_ns=0, revision=0, final=True, named=False, json='{"nodes":[{"box":[1.0,2.5]}]}')
     answer = Answer(frame_id=-1, stamp_ns=0, question_id="q7", json='{"status":"found"}')
     text = summary(dataclasses.replace(reference, messages=[*reference.messages, graph, answer]))

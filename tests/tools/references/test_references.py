@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from placegraph.runtime.errors import ConfigError, SchemaError
 from placegraph.runtime.messages import Question
 from placegraph.tools import references as tool
-from placegraph.tools.references.recorded_steps import Reference
+from placegraph.tools.references.recorded_steps import ReferenceRecording
 
 APP = typer.Typer()
 APP.command()(tool.references)
@@ -38,7 +38,7 @@ def test_the_same_code_makes_the_same_bytes(small: Path) -> None:
 
 
 def test_each_node_is_kept_with_its_settings_and_steps(small: Path) -> None:
-    reference = Reference.read(small / tool.RECORDING)
+    reference = ReferenceRecording.read(small / tool.RECORDING)
     assert list(reference.steps) == [*tool.IN_WALK, *tool.IN_HOUSE, *tool.THREE]
     assert reference.settings["pose"] == {"stride": 4}
     assert reference.settings["instances"] == {"model": "drawn_scene"}  # what flat.toml says
@@ -57,7 +57,7 @@ def test_nothing_differs_from_what_was_just_made(small: Path) -> None:
 
 
 def test_a_difference_is_listed_and_is_exit_status_1(small: Path, tmp_path: Path) -> None:
-    reference = Reference.read(small / tool.RECORDING)
+    reference = ReferenceRecording.read(small / tool.RECORDING)
     settings = reference.settings | {"fusion": {"voxel_m": 0.2}}
     dataclasses.replace(reference, settings=settings).write(tmp_path / tool.RECORDING)
     result = CliRunner().invoke(APP, ["--folder", str(tmp_path)])

@@ -1,4 +1,4 @@
-"""How well requests are read: `python tests/nodes/grounding/measure_reading.py [adapter,examples,plain,rules] [-v]`.
+"""How well requests are parsed: `python tests/measurements/request_parsing.py [adapter,examples,plain,rules] [-v]`.
 
 On the 100 sentences of people whose programs were written by hand (human_programs.jsonl; the sentences lie in
 ../shared), and on 300 generated ones with nouns and phrasings that training never says. "noun": the target's noun.
@@ -23,14 +23,15 @@ from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.training.language import examples
 
-HERE = Path(__file__).parent
-SENTENCES = HERE.parents[2].parent / "shared" / "data" / "language" / "human_requests.jsonl"
+ROOT = Path(__file__).parents[2]
+PROGRAMS = ROOT / "tests" / "nodes" / "grounding" / "human_programs.jsonl"
+SENTENCES = ROOT.parent / "shared" / "data" / "language" / "human_requests.jsonl"
 
 
 def people():
     """Sentences of people with the programs that are right."""
     lines = SENTENCES.read_text("utf-8").splitlines()
-    for line in (HERE / "human_programs.jsonl").read_text("utf-8").splitlines():
+    for line in PROGRAMS.read_text("utf-8").splitlines():
         label = json.loads(line)
         yield json.loads(lines[label["line"]])["text"], label["programs"]
 

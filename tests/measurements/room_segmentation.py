@@ -1,9 +1,9 @@
 """Rooms on real occupancy maps against their published truth: mean IoU-F1@.5 (Bormann et al. 2016, ipa maps).
 
-    python tests/nodes/hierarchy/measure_rooms.py FOLDER [--sensitivity]
+    python tests/measurements/room_segmentation.py FOLDER [--sensitivity]
 
 FOLDER holds `<map>.png` (255 free, 0 occupied, 5 cm a pixel), `<map>_furnitures.png`, `<map>_truth_labels.png`.
-Beside ours the method as published (METHOD section 6): distance field, smooth, Otsu's threshold, seeds, watershed.
+Beside ours the published method (docs/method.md, rooms): distance field, smooth, Otsu's threshold, seeds, watershed.
 With --sensitivity also the means for each parameter a quarter less and a quarter more, and the means without each map.
 """
 

@@ -1,4 +1,6 @@
-"""Right answers, time and calls on the lists of questions beside this file: `python tests/nodes/grounding/measure.py`.
+"""Right answers, time and calls on the questions of tests/nodes/grounding.
+
+    python tests/measurements/grounding_answers.py [program|rules|deductive]... [-v]
 
 Arguments choose modes (program, rules, deductive; all without any); -v prints the questions that were answered wrong.
 "cpu s" is the time on the processor, which other jobs on the machine do not change; the node runs on one thread.
@@ -17,12 +19,12 @@ from placegraph.nodes.grounding import NODE, GroundingConfig
 from placegraph.runtime.node import Context
 from placegraph.runtime.query.request import MODES
 
-HERE = Path(__file__).parent
+QUESTIONS = Path(__file__).parents[1] / "nodes" / "grounding"
 NOWHERE = (np.nan,) * 3
 
 
 def house():
-    spec = importlib.util.spec_from_file_location("house", HERE / "conftest.py")
+    spec = importlib.util.spec_from_file_location("house", QUESTIONS / "conftest.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -55,7 +57,7 @@ def main(arguments):
     heads = ("questions", "mode", "exact id", "s p50", "s p95", "cpu s p50", "cpu s p95", "calls a question")
     print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}", flush=True)
     for name in ("questions.toml", "questions_held_out.toml"):
-        entries = tomllib.loads((HERE / name).read_text())["question"]
+        entries = tomllib.loads((QUESTIONS / name).read_text())["question"]
         for mode in [mode for mode in MODES if mode in arguments] or MODES:
             right, seconds, busy, calls = measure(node, made, entries, mode, "-v" in arguments)
             times = " | ".join(
