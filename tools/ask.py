@@ -12,8 +12,8 @@ import typer
 from placegraph.runtime.bus.session import Bus, BusConfig
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.query.request import make_question
-from placegraph.tools.answerer import Answerer
-from placegraph.tools.batch import Batch, answer_all
+from placegraph.tools.query.offline_query import OfflineQuery
+from placegraph.tools.query.question_file import LineAnswerer, answer_all
 
 NOT_FOUND = 3
 
@@ -51,28 +51,27 @@ def ask(
         return
     if graph is not None or out is not None or not where or text is None:
         raise typer.BadParameter("expected MAP TEXT, or --batch QUESTIONS --out ANSWERS [--graph MAP]")
-    # refuses what no map can answer
-    standing = _pose(pose)
-    question = make_question(text, question_id="Q1", k=k, mode=mode, pose=standing)
+    asker_pose = _pose(pose)
+    question = make_question(text, question_id="Q1", k=k, mode=mode, pose=asker_pose)
     if where == "live":
-        request = {"text": question.text, "k": k, "mode": mode, "pose": standing}
+        request = {"text": question.text, "k": k, "mode": mode, "pose": asker_pose}
         with Bus(BusConfig(endpoint=endpoint, prefix=prefix)) as bus:
             reply = json.loads(bus.ask(json.dumps(request).encode(), timeout_s, "ask"))
     else:
-        with Answerer() as answerer:
-            reply = answerer.ask(Path(where), question)
+        with OfflineQuery() as query:
+            reply = query.ask(Path(where), question)
     print(json.dumps(reply, sort_keys=True) if as_json else _in_words(reply))
     if reply["status"] != "found":
         raise typer.Exit(NOT_FOUND if reply["status"] == "not_in_map" else 1)
 
 
 def _ask_all(questions: Path, out: Path, graph: Path | None, k: int, mode: str) -> None:
-    make_question("-", k=k, mode=mode)  # a wrong option is no fault of every line
-    with Answerer() as answerer:
+    make_question("-", k=k, mode=mode)  # checks the options once, not in every line
+    with OfflineQuery() as query:
         if graph is not None:
-            answerer.check(graph)
-        tally = answer_all(Batch(answerer, questions.parent, graph, k=k, mode=mode), questions, out)
-    print(f"{tally.in_words()}: {out}")
+            query.check(graph)
+        counts = answer_all(LineAnswerer(query, questions.parent, graph, k=k, mode=mode), questions, out)
+    print(f"{counts.text()}: {out}")
 
 
 def _pose(text: str) -> list[float] | None:

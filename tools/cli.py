@@ -27,8 +27,8 @@ from placegraph.tools import (
     run,
     view,
 )
-from placegraph.tools.evaluate.grounding_table import evaluate_grounding
-from placegraph.tools.evaluate.networks import networks
+from placegraph.tools.evaluate.grounding_command import evaluate_grounding
+from placegraph.tools.evaluate.networks_command import networks
 from placegraph.tools.simulator.command import house
 from placegraph.tools.training import command as train
 

@@ -1,4 +1,4 @@
-"""Look at this machine: what placegraph needs, what it has, and what is missing for what."""
+"""`placegraph doctor`: what placegraph needs of this machine, what is there and what is missing."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from typing import Annotated
 import psutil
 import typer
 
-MIN_MEMORY_GB = 3.5
+MIN_MEMORY_GB = 3.5  # of the whole machine; chosen by hand
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: ok, note (something optional is missing) or bad (the main job cannot run)."""
+    """The result of one check: ok, note (something optional is missing) or bad (placegraph cannot run)."""
 
     what: str
     state: str
@@ -28,9 +28,9 @@ class Finding:
 
 
 def doctor(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False) -> None:
-    """Look at this machine: what placegraph needs, what is there, what is missing for what.
+    """Check this machine: what placegraph needs, what is there, what is missing.
 
-    Exit status: 0 the main job can run, 1 it cannot.
+    Exit status: 0 placegraph can run, 1 it cannot.
     """
     findings = [*_machine(), *_packages(), _bus(), _language_model(), _camera()]
     if as_json:
@@ -61,10 +61,9 @@ def _packages() -> list[Finding]:
     needed = ["zenoh", "onnxruntime", "cv2", "scipy", "kiss_icp", "rerun", "msgpack", "llama_cpp", "wordllama"]
     findings = []
     for name in needed:
-        there = importlib.util.find_spec(name) is not None
-        findings.append(
-            Finding(name, "ok" if there else "bad", "installed" if there else "missing: pip install placegraph")
-        )
+        installed = importlib.util.find_spec(name) is not None
+        detail = "installed" if installed else "missing: pip install placegraph"
+        findings.append(Finding(name, "ok" if installed else "bad", detail))
     return findings
 
 

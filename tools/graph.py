@@ -1,4 +1,4 @@
-"""Print the dataflow table (from the code), or the scene graph of a map."""
+"""`placegraph graph`: the dataflow as tables, made from the code, or the scene graph of a map."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from placegraph.runtime.messages import Message
 from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import NODES, Node, available, plugin
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import find_graph
 
 
 def graph(
@@ -26,12 +26,12 @@ def graph(
         print()
         print(topic_table())
         return
-    found = SceneGraph.load(find_graph(map_folder))
-    print(found.to_json() if as_json else tree(found))
+    scene_graph = SceneGraph.load(find_graph(map_folder))
+    print(scene_graph.to_json() if as_json else tree(scene_graph))
 
 
 def node_types() -> dict[str, type[Node]]:
-    """Every node class by name, in the order of the dataflow (givers before takers, by name otherwise)."""
+    """Every node class by name, in the order of the dataflow (producers before consumers, otherwise by name)."""
     types: dict[str, type[Node]] = {name: plugin(NODES, name, "NODE", "node") for name in available(NODES)}
     order: list[str] = []
     waiting = sorted(types)

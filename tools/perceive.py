@@ -1,4 +1,4 @@
-"""A picture of what a dataflow's networks see on some frames of a source: masks, boxes, tags. Nothing is mapped."""
+"""`placegraph perceive`: a picture of the output of a dataflow's networks on some frames: masks, boxes, tags."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -20,10 +20,10 @@ from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import Frame, Keyframe, Message, Segments, Tags
 from placegraph.runtime.node import Context, Node, build_node
 
-NETWORKS = ("tagger", "detector", "segmenter", "instances")  # in the order of their messages
+NETWORK_NODES = ("tagger", "detector", "segmenter", "instances")  # in the order of their messages
 WIDTH_PX = 640  # of one picture on the sheet
-LINE_PX, FOOT_LINES = 19, 3
-LETTERS_A_LINE = 88
+LINE_PX, CAPTION_LINES = 19, 3
+CAPTION_COLUMNS = 88  # characters of a line
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
@@ -32,21 +32,21 @@ def perceive(
     source: Annotated[Path, typer.Option(help="Data set folder or recording; its format is recognised.")],
     out: Annotated[Path, typer.Option(help="The picture (PNG) to write.")],
     frames: Annotated[int, typer.Option(min=1, max=24, help="How many frames, evenly spaced.")] = 6,
-    of: Annotated[int, typer.Option(min=1, help="Among so many first frames of the source.")] = 500,
+    of: Annotated[int, typer.Option(min=1, help="Out of so many first frames of the source.")] = 500,
 ) -> None:
     """Run the networks of a dataflow on some frames and draw what they see, side by side."""
     settings = read(config)
     context = Context(model_dirs=tuple(settings.run.model_dirs), threads=2)
-    nodes = [build_node(name, settings.nodes[name], context) for name in NETWORKS if name in settings.nodes]
+    nodes = [build_node(name, settings.nodes[name], context) for name in NETWORK_NODES if name in settings.nodes]
     if not nodes:
-        raise ConfigError(f"{config}: none of the nodes {', '.join(NETWORKS)} is in it")
+        raise ConfigError(f"{config}: none of the nodes {', '.join(NETWORK_NODES)} is in it")
     chosen = list(islice(detect_source(str(source))(source, {}).frames(), 0, of, max(of // frames, 1)))[:frames]
     if not chosen:
         raise SourceError(f"{source}: the source gave no frame")
     for node in nodes:
         node.start()
     try:
-        pictures = [draw(frame, see(frame, nodes)) for frame in chosen]
+        pictures = [draw(frame, run_networks(frame, nodes)) for frame in chosen]
     finally:
         for node in nodes:
             node.stop()
@@ -55,59 +55,60 @@ def perceive(
     print(f"{out}: frames {', '.join(str(frame.frame_id) for frame in chosen)} of {source}")
 
 
-def see(frame: Frame, nodes: Sequence[Node]) -> list[Message]:
-    """Every message that the networks give about one frame."""
-    given: list[Message] = [Keyframe.of(frame, np.eye(4))]
+def run_networks(frame: Frame, nodes: Sequence[Node]) -> list[Message]:
+    """All messages that the networks give about one frame."""
+    messages: list[Message] = [Keyframe.of(frame, np.eye(4))]
     for node in nodes:
-        for message in list(given):
+        for message in list(messages):
             if type(message) in node.inputs:
-                given += node.step(message)
-    return given[1:]
+                messages += node.step(message)
+    return messages[1:]
 
 
-def draw(frame: Frame, seen: Sequence[Message]) -> U8:
+def draw(frame: Frame, messages: Sequence[Message]) -> U8:
     """One picture (H, W, 3) sRGB: masks with names and scores, and below it the tags."""
     height = round(frame.color.shape[0] * WIDTH_PX / frame.color.shape[1])
     scale = WIDTH_PX / frame.color.shape[1]
     picture = np.asarray(cv2.resize(frame.color, (WIDTH_PX, height)), np.uint8)
-    for segments in (one for one in seen if isinstance(one, Segments)):
+    for segments in (message for message in messages if isinstance(message, Segments)):
         masks = list(segments.masks())
         for k, box in enumerate(segments.boxes_px):
-            _draw_one(
-                picture, masks[k], (box * scale).round().astype(int).tolist(), segments.names[k], segments.scores[k]
-            )
-    foot = np.full((FOOT_LINES * LINE_PX + 6, WIDTH_PX, 3), 255, np.uint8)
+            corners = (box * scale).round().astype(int).tolist()
+            _draw_mask(picture, masks[k], corners, f"{segments.names[k]} {segments.scores[k]:.2f}", segments.names[k])
+    caption = np.full((CAPTION_LINES * LINE_PX + 6, WIDTH_PX, 3), 255, np.uint8)
     words = ", ".join(
         f"{name} {score:.2f}"
-        for tags in seen
+        for tags in messages
         if isinstance(tags, Tags)
         for name, score in zip(tags.names, tags.scores, strict=True)
     )
-    lines = [f"frame {frame.frame_id}; tags: {words or 'none'}"[i * LETTERS_A_LINE :] for i in range(FOOT_LINES)]
+    lines = [f"frame {frame.frame_id}; tags: {words or 'none'}"[i * CAPTION_COLUMNS :] for i in range(CAPTION_LINES)]
     for i, line in enumerate(lines):
-        cv2.putText(foot, line[:LETTERS_A_LINE], (5, LINE_PX * (i + 1) - 4), FONT, 0.42, (20, 20, 20), 1, cv2.LINE_AA)
-    return np.concatenate((picture, foot))
+        cv2.putText(
+            caption, line[:CAPTION_COLUMNS], (5, LINE_PX * (i + 1) - 4), FONT, 0.42, (20, 20, 20), 1, cv2.LINE_AA
+        )
+    return np.concatenate((picture, caption))
 
 
 def sheet(pictures: Sequence[U8]) -> U8:
     """Pictures in rows of three, padded with white."""
     columns = min(len(pictures), 3)
-    tallest = max(len(one) for one in pictures)
+    tallest = max(len(picture) for picture in pictures)
     blank = np.full((tallest, WIDTH_PX, 3), 255, np.uint8)
-    padded: list[U8] = [np.concatenate((one, blank[len(one) :])) for one in pictures]
+    padded: list[U8] = [np.concatenate((picture, blank[len(picture) :])) for picture in pictures]
     padded += [blank] * (-len(padded) % columns)
     return np.concatenate([np.concatenate(padded[i : i + columns], axis=1) for i in range(0, len(padded), columns)])
 
 
-def _draw_one(picture: U8, mask: Bool, box: list[int], name: str, score: Any) -> None:
+def _draw_mask(picture: U8, mask: Bool, box: list[int], text: str, name: str) -> None:
     x0, y0, x1, y1 = box
     hue = (zlib.crc32(name.encode()) & 0xFFFF) / 0x10000
     color = tuple(round(255 * part) for part in colorsys.hsv_to_rgb(hue, 0.8, 1.0))
-    here = picture[y0:y1, x0:x1]
-    if here.size:
-        shape = cv2.resize(mask.astype(np.uint8), (here.shape[1], here.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
-        here[shape] = (0.55 * here[shape] + 0.45 * np.array(color)).astype(np.uint8)
+    crop = picture[y0:y1, x0:x1]
+    if crop.size:
+        shape = cv2.resize(mask.astype(np.uint8), crop.shape[1::-1], interpolation=cv2.INTER_NEAREST) > 0
+        crop[shape] = (0.55 * crop[shape] + 0.45 * np.array(color)).astype(np.uint8)
     cv2.rectangle(picture, (x0, y0), (x1, y1), color, 1, cv2.LINE_AA)
-    text, at = f"{name} {score:.2f}", (x0 + 2, max(y0 - 3, 11))
+    at = (x0 + 2, max(y0 - 3, 11))
     cv2.putText(picture, text, at, FONT, 0.42, (0, 0, 0), 3, cv2.LINE_AA)
     cv2.putText(picture, text, at, FONT, 0.42, color, 1, cv2.LINE_AA)

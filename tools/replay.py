@@ -1,4 +1,4 @@
-"""Run the graph again from a recording, or the message that stopped a process from its crash file."""
+"""`placegraph replay`: a recording into a map again, or the messages of a crash file through their node again."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from placegraph.runtime.errors import ConfigError, SchemaError, SourceError
 from placegraph.runtime.messages.codec import decode
 from placegraph.runtime.node import build_node
 from placegraph.runtime.process import ProcessSpec
-from placegraph.tools.map_folder import RUN, read_config
+from placegraph.tools.map_files.map_folder import RUN, read_config
 from placegraph.tools.run import run_dataflow
 
 BEFORE_KEYFRAMES = ("camera", "pose", "keyframe")
@@ -31,9 +31,9 @@ def replay(
     inline: Annotated[bool, typer.Option("--inline", help="One thread instead of a process for each node.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress table.")] = False,
 ) -> None:
-    """Run everything behind the keyframes again from a recording: same recording, same graph.
+    """Map a recording again from its keyframes: the same recording gives the same graph.
 
-    With a crash file: build the node as it was and step the messages that led to its end.
+    With a crash file: build the node with its settings and step the messages that led to the crash.
     """
     if recording.suffix == ".rec":
         replay_crash(recording)
@@ -54,24 +54,24 @@ def _settings_of(recording: Path) -> RunConfig:
 
 
 def replay_crash(path: Path) -> None:
-    """Step the kept messages of a crash file here; the same error comes out unless it depends on older state."""
+    """Step the messages of a crash file; the same error is raised unless it depends on older state."""
     spec, trace, kept = _read_crash(path)
     log.configure(spec.node, "DEBUG")
     print(f"{spec.node} ended with:\n{trace}")
-    with tempfile.TemporaryDirectory() as folder:  # the run's own would be written over: the recorder opens its file
+    with tempfile.TemporaryDirectory() as folder:  # a recorder would overwrite the run's own file
         node = build_node(spec.node, spec.settings, spec.context.model_copy(update={"out_dir": folder}))
         try:
             node.start()
             for message in kept:
                 print(f"step {type(message).__name__} of frame {message.frame_id}")
-                for given in node.step(message):
-                    print(f"  gives {type(given).__name__} of frame {given.frame_id}")
+                for output in node.step(message):
+                    print(f"  gives {type(output).__name__} of frame {output.frame_id}")
         finally:
             node.stop()
 
 
 def _read_crash(path: Path) -> tuple[ProcessSpec, str, list[messages.Message]]:
-    """What the shell wrote of a node's end: its spec, the traceback, and the messages that led to it."""
+    """What a node's process wrote when it crashed: its spec, the traceback, and the messages that led to it."""
     kinds = {kind.__name__: kind for kind in messages.all_kinds()}
     try:
         spec, trace, envelopes = msgpack.unpackb(path.read_bytes())

@@ -26,7 +26,7 @@ def view(
     command = viewer_command(path, screenshot, web)
     try:
         code = subprocess.run(command, check=False).returncode
-    except KeyboardInterrupt:  # the viewer got the same Ctrl-C and ends by itself
+    except KeyboardInterrupt:  # the viewer received the same Ctrl-C and ends by itself
         code = 130
     raise typer.Exit(code)
 

@@ -16,8 +16,9 @@ from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.config import RunConfig, build
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.inline import Inline
-from placegraph.tools.map_folder import GRAPH, Collector
+from placegraph.tools.map_files.map_folder import GRAPH
 from placegraph.tools.run import _keep, run_dataflow
+from placegraph.tools.run.map_collector import MapCollector
 
 NODES = """[nodes.camera]
 source = "flat"
@@ -102,7 +103,7 @@ def test_a_run_that_fails_keeps_what_it_mapped(tmp_path: Path, writable: bool) -
     camera = {"source": "flat", "limit": 40, "settings": {"width": 64, "height": 48}}
     nodes = {"camera": camera, "pose": {"method": "given"}, "keyframe": {}, "instances": {"model": "drawn_scene"}}
     dataflow = build(RunConfig(nodes=nodes | {"fusion": {"map_every": 1}, "hierarchy": {}}))
-    collector, folder = Collector(dataflow), tmp_path / "map"
+    collector, folder = MapCollector(dataflow), tmp_path / "map"
     assert _keep(collector, folder) == "" and not folder.exists()
     with Inline(dataflow, collector.add) as shell:
         for message in dataflow.source.messages():

@@ -7,8 +7,8 @@ import pytest
 
 from placegraph.runtime.node import NODES, available
 from placegraph.tools.graph import node_types
-from placegraph.tools.recorded_steps import Reference, differences, summary
 from placegraph.tools.references import LEFT_OUT, RECORDING, SUMMARY
+from placegraph.tools.references.recorded_steps import ReferenceRecording, differences, summary
 
 HERE = Path(__file__).parent
 CONSUMERS = sorted(name for name, kind in node_types().items() if kind.inputs)
@@ -28,11 +28,11 @@ CHANGED: dict[str, dict[str, Any]] = {
 
 
 @pytest.fixture(scope="module")
-def reference() -> Reference:
-    return Reference.read(HERE / RECORDING)
+def reference() -> ReferenceRecording:
+    return ReferenceRecording.read(HERE / RECORDING)
 
 
-def test_every_node_that_takes_something_has_a_reference_or_a_reason(reference: Reference) -> None:
+def test_every_node_that_takes_something_has_a_reference_or_a_reason(reference: ReferenceRecording) -> None:
     assert set(reference.steps) | set(LEFT_OUT) == set(CONSUMERS)
     assert not set(reference.steps) & set(LEFT_OUT)
     assert set(CONSUMERS) <= set(available(NODES))
@@ -40,28 +40,28 @@ def test_every_node_that_takes_something_has_a_reference_or_a_reason(reference: 
 
 
 @pytest.mark.parametrize("name", [name for name in CONSUMERS if name not in LEFT_OUT])
-def test_a_fresh_node_gives_what_it_gave(reference: Reference, name: str) -> None:
+def test_a_fresh_node_gives_what_it_gave(reference: ReferenceRecording, name: str) -> None:
     assert any(given for _, given in reference.steps[name])
     found = differences(reference, name)
     assert found == [], "\n".join(["", *found, "meant? placegraph references --update, and say why in the commit"])
 
 
 @pytest.mark.parametrize("name", [name for name in CONSUMERS if name not in LEFT_OUT])
-def test_a_changed_setting_is_noticed(reference: Reference, name: str) -> None:
+def test_a_changed_setting_is_noticed(reference: ReferenceRecording, name: str) -> None:
     assert differences(reference, name, **CHANGED[name]) != []
 
 
-def test_each_kind_that_a_node_gives_is_in_its_reference(reference: Reference) -> None:
+def test_each_kind_that_a_node_gives_is_in_its_reference(reference: ReferenceRecording) -> None:
     for name, steps in reference.steps.items():
         given = {type(reference.messages[i]) for _, numbers in steps for i in numbers}
         assert given == set(node_types()[name].outputs), name
 
 
-def test_the_language_model_is_asked_in_both_ways(reference: Reference) -> None:
+def test_the_language_model_is_asked_in_both_ways(reference: ReferenceRecording) -> None:
     assert {key.split('"')[1] for key in reference.replies} == {"complete", "log_probabilities"}
 
 
-def test_the_summary_is_that_of_the_recording(reference: Reference) -> None:
+def test_the_summary_is_that_of_the_recording(reference: ReferenceRecording) -> None:
     assert (HERE / SUMMARY).read_text(encoding="utf-8") == summary(reference)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from placegraph.runtime.query.reply import Reply
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.answerer import Answerer
+from placegraph.tools.query.offline_query import OfflineQuery
 
 POSE = "pose: expected x,y,z or x,y,z,yaw in metres and degrees, world frame"
 KEYS = {
@@ -99,9 +99,9 @@ def test_a_question_that_no_map_can_answer(cli, mapped, where, arguments, reason
 
 def test_a_pose_has_a_heading_in_degrees(cli, mapped, monkeypatch) -> None:
     asked = []
-    ask = Answerer.ask
+    ask = OfflineQuery.ask
     monkeypatch.setattr(
-        Answerer, "ask", lambda self, path, question: asked.append(question) or ask(self, path, question)
+        OfflineQuery, "ask", lambda self, path, question: asked.append(question) or ask(self, path, question)
     )
     assert cli("ask", mapped, "a chair", "--pose", "1,2,1.5,-90").code == 0
     assert asked[0].viewpoint_world.tolist() == [1, 2, 1.5] and asked[0].heading_rad == -math.pi / 2

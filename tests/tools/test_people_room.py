@@ -5,7 +5,7 @@ import json
 import pytest
 
 from placegraph.runtime.query.request import make_question
-from placegraph.tools.answerer import Answerer
+from placegraph.tools.query.offline_query import OfflineQuery
 
 ROOM = (  # name, centre, size in metres
     ("bed", (1, 1, 0.3), (1.6, 2, 0.6)),
@@ -32,7 +32,7 @@ def ask(tmp_path_factory):
     file = tmp_path_factory.mktemp("room") / "room.json"
     objects = [{"id": i, "tags": [name], "center": at, "size": size} for i, (name, at, size) in enumerate(ROOM)]
     file.write_text(json.dumps({"objects": objects}))
-    with Answerer() as answerer:
+    with OfflineQuery() as answerer:
         yield lambda text: answerer.ask(file, make_question(text))
 
 

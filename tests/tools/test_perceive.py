@@ -10,7 +10,7 @@ from placegraph.nodes.camera.flat import Flat
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Segments, Tags
 from placegraph.runtime.node import Context, build_node
-from placegraph.tools.perceive import WIDTH_PX, draw, perceive, see, sheet
+from placegraph.tools.perceive import WIDTH_PX, draw, perceive, run_networks, sheet
 
 FLOW = '[nodes.camera]\n\n[nodes.instances]\nmodel = "drawn_scene"\n'
 
@@ -19,7 +19,7 @@ def test_what_is_seen_is_coloured_in_the_picture() -> None:
     frame = next(iter(Flat(Path(), {"width": 160, "height": 120}).frames()))
     node = build_node("instances", {"model": "drawn_scene"}, Context())
     node.start()
-    seen = see(frame, [node])
+    seen = run_networks(frame, [node])
     segments = next(one for one in seen if isinstance(one, Segments))
     assert len(segments.names) > 0
     bare, drawn = draw(frame, []), draw(frame, seen)

@@ -1,4 +1,4 @@
-"""Measure maps against what is known of their sources: poses, and of a house or by a truth file all layers."""
+"""`placegraph evaluate`: the error of maps against the ground truth of their data sets."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.evaluate.trajectory import absolute_trajectory_error, against_given
+from placegraph.tools.evaluate.trajectory_error import absolute_trajectory_error, against_given
 
 __all__ = ["absolute_trajectory_error", "against_given", "evaluate"]
 
@@ -26,12 +26,12 @@ def evaluate(
     write_truth: Annotated[Path | None, typer.Option(help="Write the house's truth as a truth file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Compare a map with its data set: trajectory, and where the truth tells floors, rooms, locations and objects.
+    """Compare a map with its ground truth: trajectory, and whichever of floors, rooms, locations, objects it has.
 
-    Several maps, each with its own --source or --against in the same order, give a table with the means. For the truth
-    a map is turned about z and shifted as fits the trajectories best; it is not levelled anew.
+    Several maps, each with its own --source or --against in the same order, give a table with the means. A map is
+    rotated about z and shifted so that the trajectories fit best; it is not levelled.
     """
-    from placegraph.tools.evaluate.cases import file_scores, quarter_scores, source_scores, write_house_truth
+    from placegraph.tools.evaluate.map_evaluation import file_scores, quarter_scores, source_scores, write_house_truth
     from placegraph.tools.evaluate.report import map_text, plain
 
     truths = _truths(maps, source or [], against or [])
@@ -39,15 +39,16 @@ def evaluate(
     if write_truth is not None:
         write_house_truth(truths[0], write_truth)
     if progress:
-        by_part = [quarter_scores(*one) for one in zip(maps, truths, strict=True)]
-        _print_table({part: dict(zip(maps, [q[part] for q in by_part], strict=True)) for part in by_part[0]}, as_json)
+        by_map = [quarter_scores(*pair) for pair in zip(maps, truths, strict=True)]
+        quarters = {quarter: [scores[quarter] for scores in by_map] for quarter in by_map[0]}
+        _print_table({quarter: dict(zip(maps, rows, strict=True)) for quarter, rows in quarters.items()}, as_json)
         return
     score = file_scores if against else lambda folder, path: source_scores(folder, path, questions)
-    found = [score(*one) for one in zip(maps, truths, strict=True)]
-    if len(found) > 1:
-        _print_table({"": dict(zip(maps, found, strict=True))}, as_json)
+    scores = [score(*pair) for pair in zip(maps, truths, strict=True)]
+    if len(scores) > 1:
+        _print_table({"": dict(zip(maps, scores, strict=True))}, as_json)
     else:
-        print(json.dumps(plain(found[0]), sort_keys=True) if as_json else map_text(found[0], per_class))
+        print(json.dumps(plain(scores[0]), sort_keys=True) if as_json else map_text(scores[0], per_class))
 
 
 def _truths(maps: list[Path], source: list[Path], against: list[Path]) -> list[Path]:
@@ -65,7 +66,7 @@ def _check(
     maps: list[Path], source: list[Path], progress: bool, questions: bool, per_class: bool, write_truth: Path | None
 ) -> None:
     """What only one house, or only a house, can be asked for."""
-    from placegraph.tools.evaluate.cases import has_truth
+    from placegraph.tools.evaluate.map_evaluation import has_truth
 
     for asked, option in ((questions, "--questions"), (per_class, "--per-class"), (write_truth, "--write-truth")):
         if asked and (len(maps) > 1 or progress):

@@ -1,4 +1,4 @@
-"""A map folder laid onto its truth: what its graph holds, in the world frame of the given poses."""
+"""A map moved into the world frame of its ground truth, so that the two can be compared."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from placegraph.runtime.arrays import F64, Points
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import bounding_box, transform
-from placegraph.tools.map_folder import OBJECTS, find_graph, read_object_clouds
+from placegraph.tools.map_files.map_folder import OBJECTS, find_graph, read_object_clouds
 
 
 @dataclass(frozen=True, eq=False)
 class MapObject:
-    """One object of the map: tags, strongest first, and its axis-aligned box (2, 3) in metres, true world frame."""
+    """An object of the map: its tags, strongest first, and its axis-aligned box (2, 3) in metres, true world frame."""
 
     id: str
     tags: tuple[Tag, ...]
@@ -26,7 +26,7 @@ class MapObject:
 
 @dataclass(frozen=True, eq=False)
 class MapPlace:
-    """A room or location: the number of its floor in `AlignedMap.floors`, and its outline (N, 2), true world frame."""
+    """A room or location: the index of its floor in `AlignedMap.floors`, and its outline (N, 2), true world frame."""
 
     id: str
     floor: int
@@ -43,41 +43,40 @@ class AlignedMap:
     objects: tuple[MapObject, ...]
 
 
-NOTHING = AlignedMap(np.zeros((0, 2)), (), (), ())
+EMPTY_MAP = AlignedMap(np.zeros((0, 2)), (), (), ())
 
 
-def read_aligned(folder: Path, true_from_map: F64) -> AlignedMap:
-    """Read a map folder's graph and object clouds and move them by a turn about z and a shift (4, 4).
+def read_aligned_map(folder: Path, true_from_map: F64) -> AlignedMap:
+    """Read a map folder's graph and object clouds and move them by a rotation about z and a shift (4, 4).
 
-    A turned box would be too large, so boxes are made anew from the moved clouds. Raises SchemaError.
+    A rotated box would be too large, so the boxes are computed again from the moved clouds. Raises SchemaError.
     """
     graph = SceneGraph.load(find_graph(folder))
-    clouds = read_object_clouds(folder)
-    return aligned(graph, clouds, true_from_map, str(folder / OBJECTS))
+    return align_map(graph, read_object_clouds(folder), true_from_map, str(folder / OBJECTS))
 
 
-def aligned(graph: SceneGraph, clouds: Mapping[str, Points], true_from_map: F64, where: str) -> AlignedMap:
-    """A graph and the points (N, 3) of its objects by id, moved by a turn about z and a shift (4, 4).
+def align_map(graph: SceneGraph, clouds: Mapping[str, Points], true_from_map: F64, source: str) -> AlignedMap:
+    """A graph and the points (N, 3) of its objects by id, moved by a rotation about z and a shift (4, 4).
 
-    Raises SchemaError, saying `where` the points are from, when those of an object are missing.
+    Raises SchemaError, which names the `source` of the points, when those of an object are missing.
     """
     floors = graph.layer("floor")
-    number = {floor.id: i for i, floor in enumerate(floors)}
+    floor_index = {floor.id: i for i, floor in enumerate(floors)}
     objects = []
     for node in graph.layer("object"):
         if node.id not in clouds or not len(clouds[node.id]):
-            raise SchemaError(f"{where}: no points of {node.id}, which the graph holds; of another run?")
+            raise SchemaError(f"{source}: no points of {node.id}, which the graph holds; of another run?")
         box = bounding_box(transform(true_from_map, clouds[node.id].astype(np.float64)))
         objects.append(MapObject(node.id, node.tags, box.astype(np.float64)))
 
     def places(layer: str) -> tuple[MapPlace, ...]:
-        return tuple(_place(graph, number, node, true_from_map) for node in graph.layer(layer))
+        return tuple(_place(graph, floor_index, node, true_from_map) for node in graph.layer(layer))
 
     heights = np.array([floor.box[:, 2] for floor in floors]).reshape(-1, 2) + true_from_map[2, 3]
     return AlignedMap(heights, places("room"), places("location"), tuple(objects))
 
 
-def _place(graph: SceneGraph, number: dict[str, int], node: Node, true_from_map: F64) -> MapPlace:
-    floor = next(step.id for step in graph.path(node.id) if step.layer == "floor")
+def _place(graph: SceneGraph, floor_index: dict[str, int], node: Node, true_from_map: F64) -> MapPlace:
+    floor_id = next(ancestor.id for ancestor in graph.path(node.id) if ancestor.layer == "floor")
     outline = node.footprint @ true_from_map[:2, :2].T + true_from_map[:2, 3]
-    return MapPlace(node.id, number[floor], np.asarray(outline))
+    return MapPlace(node.id, floor_index[floor_id], np.asarray(outline))

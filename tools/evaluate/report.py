@@ -1,4 +1,4 @@
-"""Scores as text: a line for each layer, and tables of equal columns."""
+"""Scores as text: a line for each layer, and tables with aligned columns."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.tools.evaluate.detection import mean_of_known
-from placegraph.tools.evaluate.places import BOUNDARY_M
+from placegraph.tools.evaluate.box_average_precision import mean_of_defined
+from placegraph.tools.evaluate.place_overlap import BOUNDARY_M
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number with so many digits behind the point; a dash where it is not defined."""
+    """A number with so many digits after the point; a dash for NaN."""
     return "-" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def plain(value: Any) -> Any:
-    """Scores as JSON has them: floats to 4 digits, null where one is not defined."""
+    """Scores for JSON: floats to 4 digits, null for NaN."""
     if isinstance(value, dict):
-        return {key: plain(one) for key, one in value.items()}
+        return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, float):
         return None if math.isnan(value) else round(value, 4)
     return value
@@ -35,7 +35,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-COLUMNS = (  # of a table of maps: head, where the number stands, its factor, digits
+COLUMNS = (  # of a table of maps: head, keys that lead to the number, its factor, digits
     ("ATE m", ("ate_rmse_m",), 1, 3),
     ("ATE %", ("ate_share",), 100, 2),
     ("path m", ("path_m",), 1, 1),
@@ -57,41 +57,42 @@ COLUMNS = (  # of a table of maps: head, where the number stands, its factor, di
 
 
 def means(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """The mean of each column over the maps that have it, by the column's head; NaN where none has."""
+    """The mean of each column over the maps that have it, by the column's head; NaN where none does."""
     return {
-        head: mean_of_known(np.array([_at(row, keys) * factor for row in rows])) for head, keys, factor, _ in COLUMNS
+        head: mean_of_defined(np.array([_value(row, keys) * factor for row in rows]))
+        for head, keys, factor, _ in COLUMNS
     }
 
 
 def maps_text(rows: Mapping[str, Mapping[str, Any]], averages: Mapping[str, Mapping[str, float]]) -> str:
-    """A table of scores by label, then of means by label; columns that nobody has are left out."""
-    shown = [column for column in COLUMNS if any(not math.isnan(_at(row, column[1])) for row in rows.values())]
+    """A table of scores by label, then of means by label; columns without any value are left out."""
+    shown = [column for column in COLUMNS if any(not math.isnan(_value(row, column[1])) for row in rows.values())]
     lines = [("map", *(head for head, *_ in shown))]
     for label, row in rows.items():
-        lines.append((label, *(number(_at(row, keys) * factor, digits) for _, keys, factor, digits in shown)))
+        lines.append((label, *(number(_value(row, keys) * factor, digits) for _, keys, factor, digits in shown)))
     for label, mean in averages.items():
         lines.append((label, *(number(mean[head], digits) for head, _, _, digits in shown)))
     return table(lines)
 
 
-def _at(scores: Any, keys: Sequence[str]) -> float:
+def _value(scores: Any, keys: Sequence[str]) -> float:
     for key in keys:
         scores = scores.get(key) if isinstance(scores, Mapping) else None
     return float("nan") if scores is None else float(scores)
 
 
 def map_text(scores: Mapping[str, Any], per_class: bool) -> str:
-    """Scores of one map in words: a line for each layer, and what the truth does not tell."""
+    """Scores of one map in words: a line for each layer, and which layers the truth does not have."""
     lines = [_trajectory(scores)] if "ate_rmse_m" in scores else []
-    parts = {"floors": _floors, "rooms": _rooms, "locations": _locations, "objects": _objects}
-    lines += [line for layer, words in parts.items() if layer in scores for line in words(scores[layer])]
-    absent = [layer for layer in parts if layer not in scores]
-    if len(absent) < len(parts):
+    layer_lines = {"floors": _floors, "rooms": _rooms, "locations": _locations, "objects": _objects}
+    lines += [line for layer, text in layer_lines.items() if layer in scores for line in text(scores[layer])]
+    absent = [layer for layer in layer_lines if layer not in scores]
+    if len(absent) < len(layer_lines):
         lines += [f"{layer:<10} not in the truth: not scored" for layer in absent]
         if "ate_rmse_m" not in scores:
             lines.append("trajectory not in the truth: not scored; both frames are taken as equal")
     if "place_names" in scores:
-        lines += [_place_names(layer, one) for layer, one in scores["place_names"].items()]
+        lines += [_place_names(layer, row) for layer, row in scores["place_names"].items()]
     if "connections" in scores:
         lines += _connections(scores["connections"])
     if per_class and "objects" in scores:
@@ -101,13 +102,13 @@ def map_text(scores: Mapping[str, Any], per_class: bool) -> str:
     return "\n".join(lines)
 
 
-def _place_names(layer: str, one: Mapping[str, Any]) -> str:
-    right = f"first name {number(one['top_1'])}, one of three {number(one['top_3'])}"
-    return f"names of {layer}: {right}, of {one['judged']} that lie in one true place"
+def _place_names(layer: str, row: Mapping[str, Any]) -> str:
+    right = f"first name {number(row['top_1'])}, one of three {number(row['top_3'])}"
+    return f"names of {layer}: {right}, of {row['judged']} that lie in one true place"
 
 
 def _trajectory(scores: Mapping[str, Any]) -> str:
-    of = f" of {scores['poses_given']}" if "poses_given" in scores else ""  # what is not trusted is not in the map's
+    of = f" of {scores['poses_given']}" if "poses_given" in scores else ""  # the rest is untrusted
     words = "ATE rmse {ate_rmse_m} m, max {ate_max_m} m, over {poses}{of} poses and {path_m} m of path".format(
         **scores, of=of
     )
@@ -117,36 +118,36 @@ def _trajectory(scores: Mapping[str, Any]) -> str:
     )
 
 
-def _floors(one: Mapping[str, Any]) -> list[str]:
+def _floors(row: Mapping[str, Any]) -> list[str]:
     return [
-        f"floors     {one['truth']} of {one['of']} seen, {one['map']} in the map, {one['right']} with both boundaries "
-        f"within {BOUNDARY_M:g} m: precision {number(one['precision'])}, recall {number(one['recall'])}, mean error "
-        f"{number(one['boundary_error_m'], 2)} m"
+        f"floors     {row['truth']} of {row['of']} seen, {row['map']} in the map, {row['right']} with both boundaries "
+        f"within {BOUNDARY_M:g} m: precision {number(row['precision'])}, recall {number(row['recall'])}, mean error "
+        f"{number(row['boundary_error_m'], 2)} m"
     ]
 
 
-def _rooms(one: Mapping[str, Any]) -> list[str]:
+def _rooms(row: Mapping[str, Any]) -> list[str]:
     return [
-        f"rooms      {one['truth']} of {one['of']} seen, {one['map']} in the map: F1 {number(one['f1'])}, "
-        f"precision {number(one['precision'])}, recall {number(one['recall'])} at IoU 0.5; Hydra precision "
-        f"{number(one['hydra_precision'])}, recall {number(one['hydra_recall'])}"
+        f"rooms      {row['truth']} of {row['of']} seen, {row['map']} in the map: F1 {number(row['f1'])}, "
+        f"precision {number(row['precision'])}, recall {number(row['recall'])} at IoU 0.5; Hydra precision "
+        f"{number(row['hydra_precision'])}, recall {number(row['hydra_recall'])}"
     ]
 
 
-def _locations(one: Mapping[str, Any]) -> list[str]:
-    curve = " ".join(f"{delta}:{number(f1, 2)}" for delta, f1 in one["f1_at"].items())
-    return [f"locations  {one['truth']} of {one['of']} seen, {one['map']} in the map: F1 by IoU {curve}"]
+def _locations(row: Mapping[str, Any]) -> list[str]:
+    curve = " ".join(f"{delta}:{number(f1, 2)}" for delta, f1 in row["f1_at"].items())
+    return [f"locations  {row['truth']} of {row['of']} seen, {row['map']} in the map: F1 by IoU {curve}"]
 
 
-def _objects(one: Mapping[str, Any]) -> list[str]:
+def _objects(row: Mapping[str, Any]) -> list[str]:
     lines = [
-        f"objects    {one['truth']} of {one['of']} seen well, {one['map']} in the map ({one['aside']} set "
-        f"aside): recall {number(one['recall'])}, precision {number(one['precision'])}, mean IoU "
-        f"{number(one['mean_iou'])}, {number(one['map_per_found'], 2)} map objects for each found one "
-        f"({number(one['map_per_found_any_name'], 2)} whatever the name); recall at IoU 0.5 "
-        f"{number(one['recall_50'])}, at 0.25 whatever the name {number(one['recall_any_name'])}"
+        f"objects    {row['truth']} of {row['of']} seen well, {row['map']} in the map ({row['aside']} set "
+        f"aside): recall {number(row['recall'])}, precision {number(row['precision'])}, mean IoU "
+        f"{number(row['mean_iou'])}, {number(row['map_per_found'], 2)} map objects for each found one "
+        f"({number(row['map_per_found_any_name'], 2)} whatever the name); recall at IoU 0.5 "
+        f"{number(row['recall_50'])}, at 0.25 whatever the name {number(row['recall_any_name'])}"
     ]
-    top = one["top_k"]
+    top = row["top_k"]
     if top["objects"]:
         curve = ", ".join(f"{k.replace('_', ' ')} {number(top[k])}" for k in top if k.startswith("top_"))
         lines.append(

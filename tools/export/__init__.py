@@ -11,8 +11,9 @@ import typer
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.export import clouds, dsg, glb, ros, svg
-from placegraph.tools.map_folder import find_graph
+from placegraph.tools.export import dsg, glb, ros, svg
+from placegraph.tools.export import ply as clouds
+from placegraph.tools.map_files.map_folder import find_graph
 
 
 class Format(StrEnum):

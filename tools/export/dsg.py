@@ -28,7 +28,7 @@ def write(_: Path, graph: SceneGraph, out: Path) -> list[Path]:
 
 
 def document(graph: SceneGraph) -> dict[str, Any]:
-    """What spark_dsg's DynamicSceneGraph.load takes."""
+    """The JSON that spark_dsg's DynamicSceneGraph.load reads."""
     nodes = list(graph.nodes.values())
     labels = {name: k for k, name in enumerate(sorted({node.name for node in graph.layer("object")}))}
     keys = {layer: {"layer": key, "partition": 0} for layer, key in LAYERS.items()}
@@ -48,8 +48,8 @@ def document(graph: SceneGraph) -> dict[str, Any]:
 def _passages(graph: SceneGraph) -> list[dict[str, Any]]:
     """An edge between each two rooms that connections join; its weight: the metres from middle to middle."""
     joined: dict[tuple[str, str], list[str]] = {}
-    for one in graph.connections.values():
-        joined.setdefault((one.rooms[0], one.rooms[1]), []).append(one.id)
+    for connection in graph.connections.values():
+        joined.setdefault((connection.rooms[0], connection.rooms[1]), []).append(connection.id)
     edges = []
     for (a, b), ids in joined.items():
         route = find_route(graph, a, b)
@@ -70,7 +70,7 @@ def _edge() -> dict[str, Any]:
 
 def _attributes(node: Node, labels: dict[str, int]) -> dict[str, Any]:
     red, green, blue = node.color or (128, 128, 128)
-    found: dict[str, Any] = {
+    attributes: dict[str, Any] = {
         "type": "SemanticNodeAttributes",
         "name": node.name,
         "position": _numbers(node.center),
@@ -90,16 +90,16 @@ def _attributes(node: Node, labels: dict[str, int]) -> dict[str, Any]:
         },
     }
     if node.layer == "room":
-        found |= {"type": "RoomNodeAttributes", "semantic_class_probabilities": {}}
+        attributes |= {"type": "RoomNodeAttributes", "semantic_class_probabilities": {}}
     elif node.layer == "object":
-        found |= {
+        attributes |= {
             "type": "ObjectNodeAttributes",
             "semantic_label": labels[node.name],
             "mesh_connections": [],
             "registered": False,
-            "world_R_object": _turn(node.turned_box[6]),
+            "world_R_object": _rotation(node.turned_box[6]),
         }
-    return found
+    return attributes
 
 
 def _box(node: Node) -> dict[str, Any]:
@@ -107,11 +107,11 @@ def _box(node: Node) -> dict[str, Any]:
         "type": "RAABB" if node.oriented_box else "AABB",
         "world_P_center": _numbers(node.turned_box[:3]),
         "dimensions": _numbers(node.turned_box[3:6]),
-        "world_R_center": _turn(node.turned_box[6]),
+        "world_R_center": _rotation(node.turned_box[6]),
     }
 
 
-def _turn(yaw: float) -> dict[str, float]:
+def _rotation(yaw: float) -> dict[str, float]:
     return {"w": round(math.cos(yaw / 2), 6), "x": 0.0, "y": 0.0, "z": round(math.sin(yaw / 2), 6)}
 
 

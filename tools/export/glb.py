@@ -9,7 +9,7 @@ import numpy as np
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.map_folder import read_cloud
+from placegraph.tools.map_files.map_folder import read_cloud
 
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # glTF's up is +y, ours +z
 ALPHA = 110  # of 255: the cloud shows through the boxes
@@ -47,9 +47,9 @@ def _fence(place: Node, height: float) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (2 K, 3) and triangles (4 K, 3) of a strip along a place's outline, seen from both sides."""
     count = len(place.footprint)
     feet = np.column_stack((place.footprint, np.full(count, place.box[0, 2])))
-    here, there = np.arange(count), np.roll(np.arange(count), -1)
+    start, end = np.arange(count), np.roll(np.arange(count), -1)
     faces = np.concatenate(
-        (np.column_stack((here, there, there + count)), np.column_stack((here, there + count, here + count)))
+        (np.column_stack((start, end, end + count)), np.column_stack((start, end + count, start + count)))
     )
     return np.concatenate((feet, feet + np.array([0, 0, height]))), np.concatenate((faces, faces[:, ::-1]))
 

@@ -1,7 +1,7 @@
 """The paper's labelling recipe, and any other finder of locations, against the truth of houses: F1@delta.
 
 Source: paper, "Dataset Labeling" (the recipe is nodes/hierarchy/locations.py without a model); the metric is that of
-tools/evaluate/places.py. Maps are simulated (location_maps.py), rooms are the true ones.
+tools/evaluate/place_overlap.py. Maps are simulated (location_maps.py), rooms are the true ones.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from placegraph.models_onnx import LocationDetector
 from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
 from placegraph.runtime.arrays import F64, Bool
-from placegraph.tools.evaluate.places import matched, overlaps
+from placegraph.tools.evaluate.place_overlap import match_scores, overlaps
 from placegraph.tools.simulator.build import build
 from placegraph.tools.training.location_maps import RoomScan, degrade, scan_rooms
 
@@ -78,11 +78,11 @@ def comparison(
         seen.append(np.concatenate([room.seen for room in rooms]))
         for name, find in finders.items():
             ious[name].append(house_iou(rooms, find))
-        own = [f"{matched(ious[name][-1], 0.5).f1:.3f}" for name in finders]
+        own = [f"{match_scores(ious[name][-1], 0.5).f1:.3f}" for name in finders]
         lines.append(_row(str(seed), str(len(seen[-1])), *own))
     for words, kept in (("all", np.ones(sum(map(len, seen)), bool)), ("seen", np.concatenate(seen))):
         for delta in deltas:
-            scores = [matched(block_diag(*ious[name])[:, kept], delta) for name in finders]
+            scores = [match_scores(block_diag(*ious[name])[:, kept], delta) for name in finders]
             listed = [f"{one.precision:.3f} {one.recall:.3f} {one.f1:.3f}" for one in scores]
             lines.append(_row(f"{words} @{delta:g}", str(int(kept.sum())), *listed))
     return "\n".join([*lines, "by house F1@.5; below precision, recall and F1"])

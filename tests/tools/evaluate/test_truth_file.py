@@ -5,7 +5,13 @@ import pytest
 
 from placegraph.runtime.errors import SourceError
 from placegraph.tools.evaluate import truth_file
-from placegraph.tools.evaluate.ground_truth import Known, KnownFloor, KnownObject, KnownPlace, Words
+from placegraph.tools.evaluate.ground_truth import (
+    ClassVocabulary,
+    GroundTruth,
+    GroundTruthFloor,
+    GroundTruthObject,
+    GroundTruthPlace,
+)
 from placegraph.tools.evaluate.truth_file import read_truth_file, write_truth_file
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -28,7 +34,7 @@ def test_the_example_of_the_docstring_can_be_read(tmp_path) -> None:
     file.write_text(text[text.index("    {") : text.rindex("]}") + 2])
     known = read_truth_file(file)
     assert (len(known.floors), len(known.rooms), len(known.locations), len(known.objects)) == (1, 1, 1, 1)
-    assert known.words.called(["sofa", "tables"]) == ["couch", "table"]
+    assert known.vocabulary.classes_of(["sofa", "tables"]) == ["couch", "table"]
     assert known.trajectory[1305031102160000000][:3, 3].tolist() == [1.3, 0.6, 1.6]
 
 
@@ -42,7 +48,7 @@ def test_what_is_left_out_is_unknown_and_what_is_empty_is_known(read) -> None:
 def test_what_is_left_out_of_an_entry(read) -> None:
     known = read(rooms=[{"polygon": SQUARE}], objects=[{"name": "sofa", "box": BOX}])
     assert (known.rooms[0].floor, known.rooms[0].seen, known.objects[0].seen) == (0, True, "well")
-    assert known.words.names == ("sofa",) and not known.words.embedding
+    assert known.vocabulary.names == ("sofa",) and not known.vocabulary.embedding
 
 
 def test_what_was_not_seen_well(read) -> None:
@@ -102,19 +108,19 @@ def test_files_that_are_none(tmp_path) -> None:
         with pytest.raises(SourceError, match=r"bad\.json: "):
             read_truth_file(tmp_path / "bad.json")
     with pytest.raises(SourceError, match="cannot be written"):
-        write_truth_file(Known(), tmp_path / "no" / "truth.json")
+        write_truth_file(GroundTruth(), tmp_path / "no" / "truth.json")
 
 
 def test_what_is_written_is_read_back(tmp_path) -> None:
     pose = np.eye(4)
     pose[:3, 3] = (1, 2, 3)
     square, box = np.array(SQUARE, float), np.array(BOX, float)
-    known = Known(
-        floors=(KnownFloor(0.0, 2.5), KnownFloor(2.8, 5.0, seen=False)),
-        rooms=(KnownPlace(1, square, seen=False),),
+    known = GroundTruth(
+        floors=(GroundTruthFloor(0.0, 2.5), GroundTruthFloor(2.8, 5.0, seen=False)),
+        rooms=(GroundTruthPlace(1, square, seen=False),),
         locations=(),
-        objects=(KnownObject("sofa", box, "poorly"), KnownObject("bed", box)),
-        words=Words({"sofa": ["couch"], "bed": []}, embedding=True),
+        objects=(GroundTruthObject("sofa", box, "poorly"), GroundTruthObject("bed", box)),
+        vocabulary=ClassVocabulary({"sofa": ["couch"], "bed": []}, embedding=True),
         trajectory={1_500_000_000: pose},
     )
     file = tmp_path / "truth.json"
@@ -123,10 +129,10 @@ def test_what_is_written_is_read_back(tmp_path) -> None:
     assert again.floors == known.floors and again.locations == ()
     assert (again.rooms[0].floor, again.rooms[0].seen, again.rooms[0].outline.tolist()) == (1, False, SQUARE)
     assert [(one.name, one.seen) for one in again.objects] == [("sofa", "poorly"), ("bed", "well")]
-    assert again.words.classes == known.words.classes and again.words.embedding
+    assert again.vocabulary.classes == known.vocabulary.classes and again.vocabulary.embedding
     assert again.trajectory[1_500_000_000] == pytest.approx(pose)
     before = file.read_bytes()
     write_truth_file(again, file)
     assert file.read_bytes() == before
-    write_truth_file(Known(), file)
+    write_truth_file(GroundTruth(), file)
     assert read_truth_file(file).rooms is None

@@ -9,8 +9,8 @@ import pytest
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Connection
 from placegraph.tools.export import dsg, svg
-from placegraph.tools.map_folder import read_cloud, read_object_clouds
-from placegraph.tools.ply import write_points
+from placegraph.tools.map_files.map_folder import read_cloud, read_object_clouds
+from placegraph.tools.map_files.ply import write_points
 from placegraph.tools.rooms import read_map
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -1,0 +1,25 @@
+import numpy as np
+import pytest
+
+from placegraph.tools.evaluate.mask_iou import mask_overlaps
+
+
+def mask(*cells):
+    found = np.zeros((4, 4), bool)
+    found.ravel()[list(cells)] = True
+    return found
+
+
+def test_no_masks() -> None:
+    assert mask_overlaps([], []).shape == (0,)
+
+
+def test_by_hand() -> None:
+    found = [mask(0, 1, 2), mask(5), mask(), mask(), mask(7)]
+    true = [mask(1, 2, 3), mask(5), mask(), mask(1), mask()]
+    assert mask_overlaps(found, true) == pytest.approx([0.5, 1, np.nan, 0, 0], nan_ok=True)
+
+
+def test_lists_of_different_lengths_are_a_bug() -> None:
+    with pytest.raises(ValueError):
+        mask_overlaps([mask()], [])

@@ -1,0 +1,199 @@
+"""Variants of grounding, with and without its parts: questions of houses, asked of their true graphs or of maps.
+
+Source: paper, the ablations of object grounding. Each variant changes one thing of the default mode.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from placegraph.models_onnx.text_encoder import TextEncoder
+from placegraph.nodes.camera import detect_source
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_by_examples, read_request
+from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
+from placegraph.nodes.grounding.program import Program, Thing
+from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.reasoner import Reasoner
+from placegraph.runtime.arrays import F64
+from placegraph.runtime.errors import ConfigError, QueryError, SourceError
+from placegraph.runtime.language.language_model import LanguageModel
+from placegraph.runtime.messages import Question
+from placegraph.runtime.query.request import make_question
+from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.tools.evaluate.aligned_map import read_aligned_map
+from placegraph.tools.evaluate.grounding_scores import QuestionResult, eye_in_map, read_questions
+from placegraph.tools.evaluate.trajectory_error import level_alignment, paired
+from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph
+from placegraph.tools.map_files.trajectory_file import read_trajectory
+from placegraph.tools.simulator.build import build
+from placegraph.tools.simulator.questions import AskedQuestion, questions
+from placegraph.tools.simulator.true_graph import true_graph
+
+
+@dataclass(frozen=True, eq=False)
+class QuestionScene:
+    """A graph, the questions about it, and how its frame lies in that of the questions.
+
+    true_from_graph: (4, 4) rigid transform. boxes: (2, 3) of each object by id, in the frame of the questions.
+    true_ids: whether O<number> is the item of that number, as in a true graph.
+    """
+
+    name: str
+    graph: SceneGraph
+    questions: Sequence[AskedQuestion]
+    true_from_graph: F64
+    boxes: Mapping[str, F64]
+    true_ids: bool = False
+
+    def question(self, asked: AskedQuestion, mode: str = "program") -> Question:
+        """What the asker sends: the text, and where it stands in the graph's frame."""
+        return make_question(asked.text, mode=mode, pose=eye_in_map(asked, self.true_from_graph))
+
+
+def house_scene(seed: int, count: int) -> QuestionScene:
+    """The true graph of the house of a seed, with up to `count` questions."""
+    house = build(seed)
+    graph = true_graph(house)
+    boxes = {node.id: node.box for node in graph.layer("object")}
+    return QuestionScene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes, true_ids=True)
+
+
+def map_scene(folder: Path, source: Path) -> QuestionScene:
+    """A map with the questions of its house. Raises SourceError where the house has none, SchemaError for the map."""
+    house_questions = read_questions(source)
+    if not house_questions:
+        raise SourceError(f"{source}: no questions in truth/questions.json")
+    given = detect_source(str(source))(source, {}).given_poses()
+    estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
+    true_from_map = level_alignment(estimated, true)
+    boxes = {thing.id: thing.box for thing in read_aligned_map(folder, true_from_map).objects}
+    return QuestionScene(str(folder), SceneGraph.load(find_graph(folder)), house_questions, true_from_map, boxes)
+
+
+class VariantRunner:
+    """Asks questions in all variants; the model reads each request once, and each variant's time includes it."""
+
+    def __init__(self, threads: int = 1) -> None:
+        self.model = LanguageModel(threads=threads, adapter_path=default_adapter_path())
+        names = Names(TextEncoder().encode)
+        self.reasoner = Reasoner(names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
+        self._read: dict[tuple[str, str], Program] = {}
+        self._cost: dict[tuple[str, str], float] = {}  # ms of each reading
+        self._saved_ms, self._saved_calls = 0.0, 0  # of a kept reading: added to the time of the variant that uses it
+        self._flat: dict[str, SceneGraph] = {}
+
+    def ask(self, variant: str, scene: QuestionScene, asked: AskedQuestion) -> QuestionResult:
+        """The reply of one variant."""
+        calls, began = self.model.calls, time.perf_counter()
+        self._saved_ms, self._saved_calls = 0.0, 0
+        try:
+            reply = VARIANTS[variant].answer(self, scene, asked)
+        except QueryError:
+            reply = {"status": "error", "object_id": None}
+        ms = (time.perf_counter() - began) * 1e3 + self._saved_ms
+        calls = self.model.calls - calls + self._saved_calls
+        return QuestionResult(reply["status"], reply["object_id"] or "", calls, ms)
+
+    def by_mode(self, scene: QuestionScene, asked: AskedQuestion, mode: str) -> dict[str, Any]:
+        """The answer of one of the product's modes."""
+        return self.reasoner.answer(scene.graph, 0, scene.question(asked, mode))
+
+    def by_program(
+        self, scene: QuestionScene, asked: AskedQuestion, program: Program, graph: SceneGraph | None = None
+    ) -> dict[str, Any]:
+        """The answer to a program that is given."""
+        return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(asked), program)
+
+    def program(self, asked: AskedQuestion, how: str = "adapter") -> Program:
+        """What the model reads: with the adapter, without, or without but with examples before the request."""
+        key = (how, asked.text)
+        if key in self._read:
+            self._saved_ms, self._saved_calls = self._cost[key], 1
+        else:
+            began = time.perf_counter()
+            if how == "examples":
+                reading = read_by_examples(self.model, asked.text)
+            else:
+                reading = read_request(self.model, asked.text, adapted=how == "adapter")
+            self._read[key] = Program(target=reading.thing or Thing(noun=asked.text))
+            self._cost[key] = (time.perf_counter() - began) * 1e3
+        return self._read[key]
+
+    def flat(self, scene: QuestionScene) -> SceneGraph:
+        """The scene's objects in one room without a name."""
+        if scene.name not in self._flat:
+            self._flat[scene.name] = without_hierarchy(scene.graph)
+        return self._flat[scene.name]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to answer, in words and as a function."""
+
+    description: str
+    answer: Callable[[VariantRunner, QuestionScene, AskedQuestion], dict[str, Any]]
+
+
+VARIANTS: Mapping[str, Variant] = {
+    "program": Variant("the default: read by the model with its adapter", lambda a, s, q: a.by_mode(s, q, "program")),
+    "oracle": Variant("the true program in place of the reading", lambda a, s, q: a.by_program(s, q, true_program(q))),
+    "no relations": Variant(
+        "only the noun, room and floor count, as in HOV-SG",
+        lambda a, s, q: a.by_program(s, q, without_relations(a.program(q))),
+    ),
+    "flat": Variant(
+        "no hierarchy: one room, no floors, no places in the request",
+        lambda a, s, q: a.by_program(s, q, without_places(a.program(q)), a.flat(s)),
+    ),
+    "rules": Variant("read by phrase rules, no model", lambda a, s, q: a.by_mode(s, q, "rules")),
+    "no adapter": Variant(
+        "the same call without the adapter", lambda a, s, q: a.by_program(s, q, a.program(q, "plain"))
+    ),
+    "stock": Variant(
+        "without the adapter, with examples in the prompt", lambda a, s, q: a.by_program(s, q, a.program(q, "examples"))
+    ),
+    "deductive": Variant("the paper's flow of calls", lambda a, s, q: a.by_mode(s, q, "deductive")),
+}
+
+
+def chosen_variants(names: str) -> list[str]:
+    """Variant names of a comma separated list; raises ConfigError naming what there is."""
+    chosen = [name.strip() for name in names.split(",") if name.strip()]
+    unknown = [name for name in chosen if name not in VARIANTS]
+    if unknown or not chosen:
+        raise ConfigError(f"--variants: {unknown[0] if unknown else names!r} is none of {', '.join(VARIANTS)}")
+    return chosen
+
+
+def true_program(asked: AskedQuestion) -> Program:
+    """The program that the question was made from."""
+    return Program(target=read(asked.program))
+
+
+def without_relations(program: Program) -> Program:
+    """The noun with its room and floor alone."""
+    kept = tuple(condition for condition in program.target.conditions if condition.kind == "place")
+    return Program(target=Thing(noun=program.target.noun, conditions=kept))
+
+
+def without_places(program: Program) -> Program:
+    """The request without room and floor."""
+    kept = tuple(condition for condition in program.target.conditions if condition.kind != "place")
+    return Program(target=Thing(noun=program.target.noun, conditions=kept))
+
+
+def without_hierarchy(graph: SceneGraph) -> SceneGraph:
+    """All objects of a graph in one room, without names of places, connections and ways."""
+
+    def place(node_id: str, parent: str) -> Node:
+        return replace(graph.building, id=node_id, parent=parent, tags=())
+
+    objects = [replace(node, parent="R0", approach=None) for node in graph.layer("object")]
+    return SceneGraph.of([place("B0", ""), place("F0", "B0"), place("R0", "F0"), *objects])

@@ -1,0 +1,1 @@
+"""Questions about maps and object lists that lie in files."""
