@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from placegraph.nodes.camera import detect
+from placegraph.nodes.camera import detect_source
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.vision.geometry import inverse, transform
@@ -162,7 +162,7 @@ def test_a_straight_walk_says_where_the_map_is() -> None:
 @pytest.fixture
 def track(tmp_path, seven):
     """A map folder whose trajectory is the given one of `seven`, moved and turned, with the last point 0.3 m off."""
-    given = detect(str(seven))(seven, {}).given_poses()
+    given = detect_source(str(seven))(seven, {}).given_poses()
     motion = np.eye(4)
     motion[:3, :3] = Rotation.from_euler("z", 0.7).as_matrix()
     motion[:3, 3] = (4, 5, 6)
