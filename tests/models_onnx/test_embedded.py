@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from placegraph.models_onnx import Detector, Segmenter, Tagger
+from placegraph.models_onnx import DetectorExport, Segmenter, TaggerNetwork
 from placegraph.models_onnx.load import load
 from placegraph.models_onnx.manifest import EMBEDDED_DIR
 from placegraph.tools.evaluate.masks import mask_overlaps
 from placegraph.tools.evaluate.views import EvaluationView, evaluation_views
-from placegraph.tools.simulator.classes import NAMES
-from placegraph.tools.training.samples import load_shards
-from placegraph.tools.training.views import EVALUATION_SEEDS, render_house
+from placegraph.tools.simulator.object_classes import NAMES
+from placegraph.tools.training.data_augmentation import load_shards
+from placegraph.tools.training.view_rendering import EVALUATION_SEEDS, render_house
 
 MAX_BYTES = 4_000_000
 
@@ -36,7 +36,7 @@ def test_each_file_is_small() -> None:
 
 def test_the_tagger_says_most_of_what_is_there_and_not_much_else(views: list[EvaluationView]) -> None:
     tagger = load("house_tagger")
-    assert isinstance(tagger, Tagger)
+    assert isinstance(tagger, TaggerNetwork)
     right = wrong = shown = 0
     for view in views:
         said = set(tagger.tag(view.color).names)
@@ -49,7 +49,7 @@ def test_the_tagger_says_most_of_what_is_there_and_not_much_else(views: list[Eva
 
 def test_the_detector_finds_what_it_is_asked_for_also_by_words_it_never_heard(views: list[EvaluationView]) -> None:
     detector = load("house_detector")
-    assert isinstance(detector, Detector)
+    assert isinstance(detector, DetectorExport)
     found = asked = 0
     for view in views:
         truth = view.true_boxes(with_cut=False)

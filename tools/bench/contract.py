@@ -23,9 +23,9 @@ from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.runtime.scene_graph.object_list import read_listed
 from placegraph.runtime.scene_graph.object_list_import import scene_of
 from placegraph.tools.bench.fuzz import requests
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.listing import object_list
-from placegraph.tools.simulator.questions import questions
+from placegraph.tools.simulator.house_frames import generate_house
+from placegraph.tools.simulator.object_list_export import object_list
+from placegraph.tools.simulator.questions import generate_questions
 
 NODE_ID = re.compile(r"\b[BFRLOC][0-9]+\b")
 TIMEOUT_S = 600.0  # nobody waits: what takes long is seen in the times
@@ -74,9 +74,9 @@ def fuzz(count: int, *, mode: str, seed: int, floors: int = 2, settings: dict[st
 
     The map is that of a generated house with so many floors, as an object list. settings: of the grounding node.
     """
-    house = build(seed, floors)
+    house = generate_house(seed, floors)
     graph = scene_of(read_listed(object_list(house), f"house {seed}"), f"house {seed}").graph
-    texts = [question.text for question in questions(house, seed)]
+    texts = [question.text for question in generate_questions(house, seed)]
     outcome, process = Outcome(), psutil.Process()
     with _running(graph, settings or {}) as node:
         for number, (kind, payload) in enumerate(requests(texts, count, seed)):

@@ -31,9 +31,9 @@ from placegraph.tools.evaluate.aligned_map import read_aligned
 from placegraph.tools.evaluate.grounding import Reply, eye_in_map, read_questions
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
 from placegraph.tools.map_folder import TRAJECTORY, find_graph, read_trajectory
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.questions import AskedQuestion, questions
-from placegraph.tools.simulator.true_graph import true_graph
+from placegraph.tools.simulator.ground_truth_graph import ground_truth_graph
+from placegraph.tools.simulator.house_frames import generate_house
+from placegraph.tools.simulator.questions import HouseQuestion, generate_questions
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,22 +46,22 @@ class Scene:
 
     name: str
     graph: SceneGraph
-    questions: Sequence[AskedQuestion]
+    questions: Sequence[HouseQuestion]
     true_from_graph: F64
     boxes: Mapping[str, F64]
     true_ids: bool = False
 
-    def question(self, asked: AskedQuestion, mode: str = "program") -> Question:
+    def question(self, asked: HouseQuestion, mode: str = "program") -> Question:
         """What the asker sends: the text, and where it stands in the graph's frame."""
         return make_question(asked.text, mode=mode, pose=eye_in_map(asked, self.true_from_graph))
 
 
 def house_scene(seed: int, count: int) -> Scene:
     """The true graph of a house of a seed with up to `count` questions."""
-    house = build(seed)
-    graph = true_graph(house)
+    house = generate_house(seed)
+    graph = ground_truth_graph(house)
     boxes = {node.id: node.box for node in graph.layer("object")}
-    return Scene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes, true_ids=True)
+    return Scene(f"house {seed}", graph, generate_questions(house, seed, count), np.eye(4), boxes, true_ids=True)
 
 
 def map_scene(folder: Path, source: Path) -> Scene:
@@ -88,7 +88,7 @@ class Asker:
         self._saved_ms, self._saved_calls = 0.0, 0
         self._flat: dict[str, SceneGraph] = {}
 
-    def ask(self, variant: str, scene: Scene, asked: AskedQuestion) -> Reply:
+    def ask(self, variant: str, scene: Scene, asked: HouseQuestion) -> Reply:
         """The reply of one variant."""
         calls, began = self.model.calls, time.perf_counter()
         self._saved_ms, self._saved_calls = 0.0, 0
@@ -99,17 +99,17 @@ class Asker:
         ms = (time.perf_counter() - began) * 1e3 + self._saved_ms
         return Reply(fields["status"], fields["object_id"] or "", self.model.calls - calls + self._saved_calls, ms)
 
-    def by_mode(self, scene: Scene, asked: AskedQuestion, mode: str) -> dict[str, Any]:
+    def by_mode(self, scene: Scene, asked: HouseQuestion, mode: str) -> dict[str, Any]:
         """The answer of one of the product's modes."""
         return self.reasoner.answer(scene.graph, 0, scene.question(asked, mode))
 
     def by_program(
-        self, scene: Scene, asked: AskedQuestion, program: Program, graph: SceneGraph | None = None
+        self, scene: Scene, asked: HouseQuestion, program: Program, graph: SceneGraph | None = None
     ) -> dict[str, Any]:
         """The answer to a program that is given."""
         return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(asked), program)
 
-    def program(self, asked: AskedQuestion, how: str = "adapter") -> Program:
+    def program(self, asked: HouseQuestion, how: str = "adapter") -> Program:
         """What the model reads: with the adapter, without, or without but with examples before the request."""
         key = (how, asked.text)
         if key in self._read:
@@ -136,7 +136,7 @@ class Variant:
     """One way to answer, and what it is."""
 
     what: str
-    answer: Callable[[Asker, Scene, AskedQuestion], dict[str, Any]]
+    answer: Callable[[Asker, Scene, HouseQuestion], dict[str, Any]]
 
 
 VARIANTS: Mapping[str, Variant] = {
@@ -170,7 +170,7 @@ def chosen_variants(names: str) -> list[str]:
     return chosen
 
 
-def true_program(asked: AskedQuestion) -> Program:
+def true_program(asked: HouseQuestion) -> Program:
     """The program that the question was made from."""
     return Program(target=read(asked.program))
 

@@ -19,7 +19,7 @@ from placegraph.tools.evaluate.scores import map_scores
 from placegraph.tools.evaluate.trajectory import at_times, level_alignment, paired, read_poses, trajectory_scores
 from placegraph.tools.evaluate.truth_file import read_truth_file, write_truth_file
 from placegraph.tools.map_folder import TRAJECTORY
-from placegraph.tools.simulator.truth import TRUTH, read_truth
+from placegraph.tools.simulator.ground_truth import TRUTH, read_truth
 
 
 def source_scores(folder: Path, source: Path, questions: bool = False) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Connection
 from placegraph.runtime.vision.geometry import transform
 from placegraph.tools.evaluate.places import share
-from placegraph.tools.simulator.truth import TrueConnection, Truth
+from placegraph.tools.simulator.ground_truth import TrueConnection, Truth
 
 NEAR_M = {"doors": 0.5, "stairs": 1.0}  # a found one is right when its middle, or the worse of its ends, is so near
 MIN_TRAVEL_M = 1.0  # ratios of shorter ways say more about where the door's middle was put

@@ -17,14 +17,14 @@ from placegraph.tools.evaluate.place_names import place_name_scores
 from placegraph.tools.evaluate.scores import map_scores
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
 from placegraph.tools.map_folder import TRAJECTORY, find_graph, read_trajectory
-from placegraph.tools.simulator.classes import CLASSES
-from placegraph.tools.simulator.space import inside
-from placegraph.tools.simulator.truth import Seen, TrueLocation, TrueRoom, Truth, read_truth
+from placegraph.tools.simulator.ground_truth import FrameCounts, TrueLocation, TrueRoom, Truth, read_truth
+from placegraph.tools.simulator.object_classes import CLASSES
+from placegraph.tools.simulator.occupancy_grid import points_in_polygon
 
 MIN_FRAMES = 5  # seen well: clear in so many frames
 MIN_SHARE = 0.5  # of a location's members must have been seen well
 MIN_HEIGHT_M = 1.0  # of a camera over the floor it is on: on the stairs it rises above a storey before the feet do
-HOUSE_WORDS = Words({one.name: (*one.said[1:], *one.unsaid) for one in CLASSES})
+HOUSE_WORDS = Words({one.name: (*one.training_words[1:], *one.held_out_words) for one in CLASSES})
 
 
 def house_scores(folder: Path, source: Path, given: Mapping[int, F64] | None, questions: bool) -> dict[str, Any]:
@@ -53,7 +53,9 @@ def house_scores(folder: Path, source: Path, given: Mapping[int, F64] | None, qu
     return found
 
 
-def known_of(truth: Truth, seen: Sequence[Seen], positions: F64, trajectory: Mapping[int, F64] | None = None) -> Known:
+def known_of(
+    truth: Truth, seen: Sequence[FrameCounts], positions: F64, trajectory: Mapping[int, F64] | None = None
+) -> Known:
     """A house as scoring reads it, after a walk that was at positions (N, 3) and saw the objects as `seen`, by id.
 
     A floor was seen when the walk was on it; a room when the walk entered it or saw an object of it well; a location
@@ -82,7 +84,7 @@ def known_of(truth: Truth, seen: Sequence[Seen], positions: F64, trajectory: Map
     )
 
 
-def sight_of(seen: Seen) -> Sight:
+def sight_of(seen: FrameCounts) -> Sight:
     """Whether the walk showed an object well enough to ask for it."""
     if seen.clear_frames >= MIN_FRAMES:
         return "well"
@@ -97,7 +99,7 @@ def _entered(outline: F64, floor_index: int, truth: Truth, positions: F64) -> bo
     floor = truth.floors[floor_index]
     height = positions[:, 2] - floor.z_m
     here = positions[(height > MIN_HEIGHT_M) & (height < floor.height_m)]
-    return bool(inside(outline, here[:, :2]).any())
+    return bool(points_in_polygon(outline, here[:, :2]).any())
 
 
 def _location_seen(place: TrueLocation, sights: Sequence[Sight]) -> bool:

@@ -15,8 +15,8 @@ import typer
 from placegraph.tools.evaluate.perception import Chosen, Networks, network_scores
 from placegraph.tools.evaluate.report import number, plain, table
 from placegraph.tools.evaluate.views import EvaluationView, evaluation_shards, evaluation_views
-from placegraph.tools.simulator.classes import NAMES
-from placegraph.tools.training.samples import Shard
+from placegraph.tools.simulator.object_classes import NAMES
+from placegraph.tools.training.data_augmentation import Shard
 
 TIMED_VIEWS = 24  # of the first houses, after one that does not count
 THREADS = (1, 2)

@@ -23,13 +23,15 @@ from placegraph.tools.evaluate.detection import FoundBoxes, TrueBoxes, mean_of_k
 from placegraph.tools.evaluate.house import HOUSE_WORDS
 from placegraph.tools.evaluate.masks import mask_overlaps
 from placegraph.tools.evaluate.views import evaluation_views
-from placegraph.tools.simulator.classes import CLASSES, NAMES
-from placegraph.tools.training.samples import Shard
+from placegraph.tools.simulator.object_classes import CLASSES, NAMES
+from placegraph.tools.training.data_augmentation import Shard
 
 FAMILIES = "placegraph.models_onnx"
 MIN_SCORE = 0.01  # in place of a run's own floor: average precision is about the order of all finds
-UNSAID = tuple(one.unsaid[0] if one.unsaid else one.name for one in CLASSES)  # a class without a synonym by its name
-HAS_UNSAID = np.array([bool(one.unsaid) for one in CLASSES])
+UNSAID = tuple(
+    one.held_out_words[0] if one.held_out_words else one.name for one in CLASSES
+)  # a class without a synonym by its name
+HAS_UNSAID = np.array([bool(one.held_out_words) for one in CLASSES])
 CLASS_OF_WORD = {word: NAMES.index(name) for word, name in HOUSE_WORDS.class_of_word.items()}
 
 

@@ -11,7 +11,7 @@ from placegraph.runtime.language.word_forms import normal_form, synonyms
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.aligned_map import AlignedMap, MapPlace
 from placegraph.tools.evaluate.places import Area, Overlaps, match_floors, overlaps, share
-from placegraph.tools.simulator.truth import Truth
+from placegraph.tools.simulator.ground_truth import Truth
 
 MIN_INSIDE = 0.5  # of a map place that must lie in one true place; else it is of no one kind, and not judged
 MAX_NAMES = 3

@@ -19,7 +19,7 @@ from placegraph.tools.evaluate.aligned_map import NOTHING, AlignedMap, aligned
 from placegraph.tools.evaluate.house import known_of
 from placegraph.tools.evaluate.scores import map_scores
 from placegraph.tools.evaluate.trajectory import against_given, level_alignment, paired
-from placegraph.tools.simulator.truth import CLEAR_SHARE, TRUTH, Seen, Truth, read_truth
+from placegraph.tools.simulator.ground_truth import CLEAR_SHARE, TRUTH, FrameCounts, Truth, read_truth
 from placegraph.tools.view import RECORDING
 
 PARTS = (0.25, 0.5, 0.75, 1.0)  # of the frames
@@ -106,7 +106,7 @@ def _age(graph: Graph) -> tuple[int, bool]:
     return graph.revision, graph.named
 
 
-def _seen_after(source: Path, truth: Truth, stamps: list[int], counts: list[int]) -> list[tuple[Seen, ...]]:
+def _seen_after(source: Path, truth: Truth, stamps: list[int], counts: list[int]) -> list[tuple[FrameCounts, ...]]:
     """How each object was seen in the first frames, for each number of them."""
     if len(stamps) != truth.house.frames:
         raise SourceError(
@@ -116,7 +116,7 @@ def _seen_after(source: Path, truth: Truth, stamps: list[int], counts: list[int]
     clear = pixels >= CLEAR_SHARE * truth.house.width * truth.house.height
     return [
         tuple(
-            Seen(id, frames, well)
+            FrameCounts(id, frames, well)
             for id, (frames, well) in enumerate(
                 zip((pixels[:count] > 0).sum(axis=0).tolist(), clear[:count].sum(axis=0).tolist(), strict=True)
             )

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.simulator.export import HouseOrder, export
-from placegraph.tools.simulator.truth import HouseRun, read_house_run
+from placegraph.tools.simulator.ground_truth import HouseRun, read_house_run
+from placegraph.tools.simulator.tum_export import HouseOrder, export
 
 
 def house(
@@ -30,10 +30,12 @@ def house(
 ) -> None:
     """Make a house and film it; `placegraph run CONFIG --source OUT` maps it."""
     order = HouseOrder(seed, floors, limit, width, width * 3 // 4, moved)
-    made = _already_there(out, order, replace)
-    run = made or export(order, out, workers, quiet)
+    existing = _already_there(out, order, replace)
+    run = existing or export(order, out, workers, quiet)
     size = f"{run.width}x{run.height}"
-    print(f"\n{'it is there already' if made else 'written'}  {out}: {run.frames} frames of {size}, seed {run.seed}")
+    print(
+        f"\n{'it is there already' if existing else 'written'}  {out}: {run.frames} frames of {size}, seed {run.seed}"
+    )
     print(f"plan     {out / 'plan.png'}\ntruth    {out / 'truth'}")
     print(f"map it   placegraph run configs/demo.toml --source {out}")
 

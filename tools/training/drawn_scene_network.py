@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     data = arguments.output.read_bytes()
     print(f"{arguments.output}: {len(data)} bytes, sha256 {hashlib.sha256(data).hexdigest()}")
     for seed in TEST_SEEDS:
-        accuracy, by_class = measure(arguments.output, seed)
+        accuracy, by_class = measure_accuracy(arguments.output, seed)
         weakest = min(by_class, key=lambda name: by_class[name])
         mean = sum(by_class.values()) / len(by_class)
         worst = f"{weakest} {by_class[weakest]:.4f}"
@@ -154,7 +154,7 @@ def build(layers: list[F32]) -> bytes:
     return bytes(model.SerializeToString(deterministic=True))
 
 
-def measure(file: Path, seed: int) -> tuple[float, dict[str, float]]:
+def measure_accuracy(file: Path, seed: int) -> tuple[float, dict[str, float]]:
     """Share of right pixels and IoU of each class, over the whole walk at its own size, by the family that runs it."""
     family = FAMILY(Weights("drawn_scene", "semantic", {"model": file}, CLASSES, {}), 1)
     source = SOURCE(Path(), {"seed": seed, "frames": 50})

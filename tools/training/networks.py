@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from placegraph.tools.training.words import EMBEDDING, KnownWords, Words
+from placegraph.tools.training.word_projection import EMBEDDING, WordProjection, WordTable
 
 STRIDES = (8, 16, 32)
 
@@ -96,8 +96,8 @@ class Backbone(nn.Module):
         c8 = self.to8(self.stem(image))
         c16 = self.to16(c8)
         c32 = self.to32(c16)
-        p16 = self.down16(torch.cat((_double(c32), c16), 1))
-        p8 = self.down8(torch.cat((_double(p16), c8), 1))
+        p16 = self.down16(torch.cat((_upsample(c32), c16), 1))
+        p8 = self.down8(torch.cat((_upsample(p16), c8), 1))
         n16 = self.join16(torch.cat((self.up16(p8), p16), 1))
         n32 = self.join32(torch.cat((self.up32(n16), c32), 1))
         return [p8, n16, n32]
@@ -128,7 +128,7 @@ class ObjectNetwork(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.backbone = Backbone()
-        self.words: Words | KnownWords = Words()
+        self.words: WordProjection | WordTable = WordProjection()
         self.boxes = nn.ModuleList(nn.Sequential(Conv(c, 64), nn.Conv2d(64, 4, 1)) for c in Backbone.WIDTHS)
         self.texts = nn.ModuleList(TextHead(c) for c in Backbone.WIDTHS)
         self.dense = TextHead(Backbone.WIDTHS[0])
@@ -146,7 +146,7 @@ class ObjectNetwork(nn.Module):
         return distances, logits, self.dense(features[0], words)
 
 
-class Detector(nn.Module):
+class DetectorExport(nn.Module):
     """ObjectNetwork in the YOLO-World export layout, for one input size."""
 
     def __init__(self, network: ObjectNetwork, height: int, width: int) -> None:
@@ -164,7 +164,7 @@ class Detector(nn.Module):
         return torch.cat(((low + high) / 2, high - low, torch.sigmoid(logits)), dim=1)
 
 
-class Tagger(nn.Module):
+class TaggerNetwork(nn.Module):
     """An ObjectNetwork without its boxes, with fixed words: logits of the whole image, RAM++ layout.
 
     The logit of a tag joins a smooth maximum over the dense head's cells and one over the detector's anchors: together
@@ -211,9 +211,9 @@ class MaskEncoder(nn.Module):
         c2 = self.to2(torch.cat((image, depth * 0.2, known), 1))
         c4 = self.to4(c2)
         c8 = self.to8(c4)
-        p8 = self.down8(torch.cat((_double(self.to16(c8)), c8), 1))
-        p4 = self.down4(torch.cat((_double(p8), c4), 1))
-        p2 = self.down2(torch.cat((_double(p4), c2), 1))
+        p8 = self.down8(torch.cat((_upsample(self.to16(c8)), c8), 1))
+        p4 = self.down4(torch.cat((_upsample(p8), c4), 1))
+        p2 = self.down2(torch.cat((_upsample(p4), c2), 1))
         return torch.cat((p2, functional.max_pool2d(depth, 2)), 1)
 
 
@@ -245,8 +245,8 @@ class MaskDecoder(nn.Module):
         e0 = self.enter(cells)
         e1 = self.down(e0)
         e2 = self.deep(e1)
-        d1 = self.up1(torch.cat((_double(e2), e1), 1))
-        d0 = self.up2(torch.cat((_double(d1), e0), 1))
+        d1 = self.up1(torch.cat((_upsample(e2), e1), 1))
+        d0 = self.up2(torch.cat((_upsample(d1), e0), 1))
         return self.mask(d0), torch.sigmoid(self.quality(e2.mean(dim=(2, 3))))
 
     def sample(self, embedding: Tensor, boxes: Tensor) -> Tensor:
@@ -266,10 +266,10 @@ class MaskDecoder(nn.Module):
         centre = (middle * seen).sum(dim=(2, 3), keepdim=True) / (seen.sum(dim=(2, 3), keepdim=True) + 1e-3)
         relative = torch.clamp(depth - centre, -2.0, 2.0)
         inside = ((self.line >= 0) & (self.line <= 1)).to(depth.dtype)
-        drawn = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
+        coarse_mask = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
         # how large the box is tells how coarse the grid is
         size = (boxes[:, 2:] - boxes[:, :2])[:, :, None, None].expand(-1, 2, g, g)
-        return torch.cat((sampled[:, :-1], relative, relative * 4.0, drawn, size), 1)
+        return torch.cat((sampled[:, :-1], relative, relative * 4.0, coarse_mask, size), 1)
 
 
 def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
@@ -282,5 +282,5 @@ def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
     return torch.cat(centres), torch.cat(strides)
 
 
-def _double(x: Tensor) -> Tensor:
+def _upsample(x: Tensor) -> Tensor:
     return functional.interpolate(x, scale_factor=2.0, mode="nearest")

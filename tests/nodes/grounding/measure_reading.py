@@ -21,7 +21,7 @@ from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.training.language import examples
+from placegraph.tools.training.request_grammar import examples
 
 HERE = Path(__file__).parent
 SENTENCES = HERE.parents[2].parent / "shared" / "data" / "language" / "human_requests.jsonl"
