@@ -18,7 +18,7 @@ from placegraph.runtime.errors import ConfigError
 Network = TypeVar("Network", bound=nn.Module)
 
 AVERAGE = 0.9995  # of the averaged weights, reached slowly
-SAVE_EVERY, SAY_EVERY = 250, 50
+REPORT_EVERY = 50  # steps
 
 
 def fit(
@@ -31,7 +31,7 @@ def fit(
     weight_decay: float = 0.02,
     warm_up: int = 200,
     clip: float = 10.0,
-    save_every: int = SAVE_EVERY,
+    save_every: int = 250,
     at_save: Callable[[int, nn.Module], None] | None = None,
 ) -> Any:
     """Train to `steps`, going on from `checkpoint` where there is one; returns the network of averaged weights.
@@ -58,8 +58,8 @@ def fit(
         _update_average(average, network, min(AVERAGE, (i + 1) / (i + 20)))
         for name, value in parts.items():
             mean[name] = 0.98 * mean.get(name, float(value.detach())) + 0.02 * float(value.detach())
-        if (i + 1) % SAY_EVERY == 0:
-            pace = (time.monotonic() - last_report) / SAY_EVERY
+        if (i + 1) % REPORT_EVERY == 0:
+            pace = (time.monotonic() - last_report) / REPORT_EVERY
             last_report = time.monotonic()
             listed = " ".join(f"{name} {value:.3f}" for name, value in mean.items())
             print(f"step {i + 1} of {steps}: {listed}; {pace:.2f} s a step", flush=True)

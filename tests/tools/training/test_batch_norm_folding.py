@@ -11,7 +11,7 @@ from placegraph.models_onnx.manifest import find  # noqa: E402
 from placegraph.models_onnx.session import Session  # noqa: E402
 from placegraph.models_onnx.text_encoder import TextEncoder  # noqa: E402
 from placegraph.runtime.errors import ModelError  # noqa: E402
-from placegraph.tools.training import fold  # noqa: E402
+from placegraph.tools.training import batch_norm_folding  # noqa: E402
 from placegraph.tools.training.batch_norm_folding import fold_batch_norm, packaged_start  # noqa: E402
 from placegraph.tools.training.networks import Csp, DetectorExport, ObjectNetwork  # noqa: E402
 
@@ -68,12 +68,12 @@ def test_new_steps_begin_by_adding_nothing(monkeypatch):
 
 
 def test_weights_that_do_not_fit_are_refused(monkeypatch):
-    weights = fold._weights(packaged()[0])
+    weights = batch_norm_folding._weights_by_module(packaged()[0])
     del weights["network.backbone.to8.0.0.weight"]
-    monkeypatch.setattr(fold, "_weights", lambda file: weights)
+    monkeypatch.setattr(batch_norm_folding, "_weights_by_module", lambda file: weights)
     with pytest.raises(ModelError, match=r"no weights for backbone\.to8\.0\.0\.weight"):
         packaged_start(*packaged())
     weights["network.backbone.to8.0.0.weight"] = np.zeros((64, 999, 3, 3), np.float32)
-    weights |= {name: one for name, one in fold._weights(packaged()[1]).items()}
+    weights |= {name: one for name, one in batch_norm_folding._weights_by_module(packaged()[1]).items()}
     with pytest.raises(ModelError):
         packaged_start(*packaged())

@@ -9,7 +9,7 @@ torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
 from placegraph.models_onnx.text_encoder import TextEncoder  # noqa: E402
 from placegraph.tools.simulator.object_classes import CLASSES  # noqa: E402
-from placegraph.tools.training import objects  # noqa: E402
+from placegraph.tools.training import detector_training  # noqa: E402
 from placegraph.tools.training.batch_norm_folding import fold_batch_norm  # noqa: E402
 from placegraph.tools.training.data_augmentation import TrainingSample  # noqa: E402
 from placegraph.tools.training.detector_training import (  # noqa: E402
@@ -34,7 +34,7 @@ def encoder():
 
 def drawn_words(encoder, monkeypatch, draws):
     """Per draw, the words of its rows, found by their vectors; noise is off."""
-    monkeypatch.setattr(objects, "TEXT_NOISE", 0.0)
+    monkeypatch.setattr(detector_training, "TEXT_NOISE", 0.0)
     words = sorted({word for one in CLASSES for word in one.training_words + one.held_out_words} | set(OTHER_WORDS))
     table = encoder.encode(words)
     prompts = Prompts(4)
@@ -123,8 +123,8 @@ def write_shard(folder, views=4, size=(48, 64)):
 
 def test_a_few_steps_of_training(tmp_path, monkeypatch):
     write_shard(tmp_path / "data" / "20000")
-    monkeypatch.setattr(objects, "FIRST_SIZES", ((64, 64), (64, 96)))
-    monkeypatch.setattr(objects, "BATCH", 2)
+    monkeypatch.setattr(detector_training, "FIRST_SIZES", ((64, 64), (64, 96)))
+    monkeypatch.setattr(detector_training, "BATCH", 2)
     seen = []
 
     real = ObjectNetwork.forward
@@ -147,8 +147,8 @@ def test_a_few_steps_of_training(tmp_path, monkeypatch):
 
 def test_refining_goes_on_without_batch_norm(tmp_path, monkeypatch):
     write_shard(tmp_path / "data" / "20000")
-    monkeypatch.setattr(objects, "SIZES", ((64, 96), (96, 96)))
-    monkeypatch.setattr(objects, "BATCH", 2)
+    monkeypatch.setattr(detector_training, "SIZES", ((64, 96), (96, 96)))
+    monkeypatch.setattr(detector_training, "BATCH", 2)
     start = fold_batch_norm(ObjectNetwork())
     before = start.backbone.stem[0][0].weight.detach().clone()
     found = refine_objects(start, tmp_path / "data", tmp_path / "refined.pt", steps=3, threads=1)

@@ -10,7 +10,7 @@ pytest.importorskip("gguf", reason="training needs the extra `train`")
 from placegraph.nodes.grounding.llm_parser import read_request  # noqa: E402
 from placegraph.runtime.errors import ConfigError, ModelError  # noqa: E402
 from placegraph.runtime.language.language_model import LanguageModel  # noqa: E402
-from placegraph.tools.training import reader  # noqa: E402
+from placegraph.tools.training import reader_training  # noqa: E402
 from placegraph.tools.training.request_grammar import Example  # noqa: E402
 
 torch.set_num_threads(1)
@@ -35,7 +35,7 @@ def test_the_reply_alone_is_predicted_from_what_stands_before_each_of_its_tokens
         seen.update(tokens=tokens, wanted=wanted)
         return torch.zeros(len(wanted), 10)
 
-    _, targets = reader.TokenBatch(model, EXAMPLES).logits(network)
+    _, targets = reader_training.TokenBatch(model, EXAMPLES).logits(network)
     laid_out = [token for tokens in seen["tokens"] for token in [*tokens, None]]  # None: the last is never read
     ends = torch.tensor([len(tokens) for tokens in seen["tokens"]]).cumsum(0)
     following = [laid_out[at + 1 + int((ends <= at).sum())] for at in seen["wanted"].tolist()]
@@ -52,27 +52,27 @@ def test_a_request_is_right_when_all_its_tokens_are(model):
         made[0] = 0  # of the first request
         return made
 
-    _, targets = reader.TokenBatch(model, EXAMPLES).logits(lambda tokens, wanted: wanted)
-    assert reader.count_exact(model, network, EXAMPLES) == len(EXAMPLES) - 1
+    _, targets = reader_training.TokenBatch(model, EXAMPLES).logits(lambda tokens, wanted: wanted)
+    assert reader_training.count_exact(model, network, EXAMPLES) == len(EXAMPLES) - 1
 
 
 def test_unusable_settings_are_named(tmp_path):
     with pytest.raises(ConfigError, match="set aside for validation"):
-        reader.train_reader(tmp_path / "a.gguf", 1, seed=reader.VALIDATION_SEED)
+        reader_training.train_reader(tmp_path / "a.gguf", 1, seed=reader_training.VALIDATION_SEED)
     with pytest.raises(ConfigError, match=r"ends in \.gguf"):
-        reader.train_reader(tmp_path / "a.bin", 1)
+        reader_training.train_reader(tmp_path / "a.bin", 1)
     with pytest.raises(ModelError, match=r"none\.gguf: no such language model"):
-        reader.train_reader(tmp_path / "a.gguf", 1, model_path=tmp_path / "none.gguf")
+        reader_training.train_reader(tmp_path / "a.gguf", 1, model_path=tmp_path / "none.gguf")
 
 
 def test_a_run_learns_stops_and_goes_on(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(reader, "examples", lambda seed, start, count, held_out=False: list(EXAMPLES))
-    monkeypatch.setattr(reader, "VALIDATION", len(EXAMPLES))
-    monkeypatch.setattr(reader, "WARM_UP", 2)
+    monkeypatch.setattr(reader_training, "examples", lambda seed, start, count, held_out=False: list(EXAMPLES))
+    monkeypatch.setattr(reader_training, "VALIDATION", len(EXAMPLES))
+    monkeypatch.setattr(reader_training, "WARM_UP", 2)
     out = tmp_path / "reader.gguf"
-    reader.train_reader(out, 12, batch=3, threads=1)
+    reader_training.train_reader(out, 12, batch=3, threads=1)
     first = out.read_bytes()
-    reader.train_reader(out, 24, batch=3, threads=1)
+    reader_training.train_reader(out, 24, batch=3, threads=1)
     assert out.read_bytes() != first
     said = capsys.readouterr().out
     assert "step 12: " in said

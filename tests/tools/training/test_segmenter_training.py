@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
-from placegraph.tools.training import masks  # noqa: E402
+from placegraph.tools.training import segmenter_training  # noqa: E402
 from placegraph.tools.training.data_augmentation import TrainingSample  # noqa: E402
 from placegraph.tools.training.networks import MaskDecoder, MaskEncoder  # noqa: E402
 from placegraph.tools.training.segmenter_training import MaskNetwork, draw_box_prompts, mask_losses, train_masks  # noqa: E402
@@ -42,8 +42,8 @@ def shapes():
 
 
 @pytest.fixture
-def count_exact(monkeypatch):
-    monkeypatch.setattr(masks, "BOX_JITTER", 0.0)
+def exact(monkeypatch):
+    monkeypatch.setattr(segmenter_training, "BOX_JITTER", 0.0)
 
 
 @pytest.mark.usefixtures("exact")
@@ -62,7 +62,7 @@ def test_a_mask_by_hand():
 @pytest.mark.parametrize("jitter", [0.0, 0.06, 0.2])
 def test_masks_are_what_the_decoder_samples_there(jitter, monkeypatch):
     """The instance image put in the place of the embedding and read by the decoder gives the true masks."""
-    monkeypatch.setattr(masks, "BOX_JITTER", jitter)
+    monkeypatch.setattr(segmenter_training, "BOX_JITTER", jitter)
     instance = shapes()
     sample = make_sample(instance)
     asked = draw_box_prompts([sample], LINE, np.random.default_rng(1))
@@ -85,11 +85,12 @@ def test_only_what_counts_is_asked_for_and_not_too_much():
     for i in range(12):
         many[10 + 40 * (i // 6) :, 4 + 20 * (i % 6) : 20 + 20 * (i % 6)] = i + 1
     asked = draw_box_prompts([some, make_sample(many)], LINE, np.random.default_rng(1))
-    assert [len(boxes) for boxes in asked.boxes] == [2, masks.BOXES] and len(asked.masks) == 2 + masks.BOXES
+    assert [len(boxes) for boxes in asked.boxes] == [2, segmenter_training.BOXES]
+    assert len(asked.masks) == 2 + segmenter_training.BOXES
     wanted = some.boxes[[0, 3]] / [WIDTH, HEIGHT, WIDTH, HEIGHT]
     found = asked.boxes[0].numpy()
     np.testing.assert_allclose(found[np.argsort(found[:, 0])], wanted[np.argsort(wanted[:, 0])], rtol=1e-6)
-    assert len(np.unique(asked.boxes[1].numpy(), axis=0)) == masks.BOXES
+    assert len(np.unique(asked.boxes[1].numpy(), axis=0)) == segmenter_training.BOXES
 
 
 def test_pictures_without_objects():
@@ -184,8 +185,8 @@ def write_shard(folder):
 
 def test_a_few_steps_of_training(tmp_path, monkeypatch):
     write_shard(tmp_path / "data" / "20000")  # half of its views show nothing
-    monkeypatch.setattr(masks, "SIZE", (64, 64))
-    monkeypatch.setattr(masks, "BATCH", 1)
+    monkeypatch.setattr(segmenter_training, "SIZE", (64, 64))
+    monkeypatch.setattr(segmenter_training, "BATCH", 1)
     found = train_masks(tmp_path / "data", tmp_path / "masks.pt", steps=3, threads=1)
     assert not found.training
     assert all(torch.isfinite(value).all() for value in found.state_dict().values() if value.is_floating_point())

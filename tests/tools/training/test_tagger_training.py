@@ -8,7 +8,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
 from placegraph.tools.simulator.object_classes import NAMES  # noqa: E402
-from placegraph.tools.training import tags  # noqa: E402
+from placegraph.tools.training import tagger_training  # noqa: E402
 from placegraph.tools.training.data_augmentation import TrainingSample  # noqa: E402
 from placegraph.tools.training.networks import ObjectNetwork  # noqa: E402
 from placegraph.tools.training.tagger_training import tag_targets, train_tagger  # noqa: E402
@@ -46,8 +46,8 @@ def test_a_few_steps_of_training(tmp_path, monkeypatch):
     np.save(folder / "instance.npy", instance)
     np.save(folder / "item_class.npy", np.array([3], np.uint8))
     np.save(folder / "boxes.npy", np.insert(visible_boxes(instance[0], np.array([3], np.uint8)), 0, 0, axis=1))
-    monkeypatch.setattr(tags, "SIZE", 64)
-    monkeypatch.setattr(tags, "BATCH", 2)
+    monkeypatch.setattr(tagger_training, "SIZE", 64)
+    monkeypatch.setattr(tagger_training, "BATCH", 2)
     torch.manual_seed(0)
     objects = ObjectNetwork().eval()
     before = {name: value.clone() for name, value in objects.state_dict().items()}

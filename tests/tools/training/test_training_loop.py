@@ -9,7 +9,6 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
 from placegraph.runtime.errors import ConfigError  # noqa: E402
-from placegraph.tools.training import loop  # noqa: E402
 from placegraph.tools.training.training_loop import fit, read_average  # noqa: E402
 
 torch.set_num_threads(1)
@@ -38,9 +37,9 @@ def make_step(network, seen, stop_at=None):
     return step
 
 
-def run(network, checkpoint, steps=10, stop_at=None):
+def run(network, checkpoint, steps=10, stop_at=None, save_every=250):
     seen = []
-    settings = {"steps": steps, "rate": 0.02, "checkpoint": checkpoint, "warm_up": 3}
+    settings = {"steps": steps, "rate": 0.02, "checkpoint": checkpoint, "warm_up": 3, "save_every": save_every}
     try:
         return fit(network, make_step(network, seen, stop_at), **settings), seen
     except Stopped:
@@ -64,13 +63,12 @@ def test_training_lowers_the_loss_and_says_how_far_it_is(tmp_path, capsys):
     assert "square" in lines[0] and "absolute" in lines[0]
 
 
-def test_stopped_and_gone_on_equals_straight_through(tmp_path, monkeypatch):
-    monkeypatch.setattr(loop, "SAVE_EVERY", 3)
+def test_stopped_and_gone_on_equals_straight_through(tmp_path):
     network = make_network()
     straight, seen = run(network, tmp_path / "straight.pt")
     assert seen == list(range(10))
     checkpoint = tmp_path / "deep" / "net.pt"
-    _, first = run(make_network(), checkpoint, stop_at=8)
+    _, first = run(make_network(), checkpoint, stop_at=8, save_every=3)
     assert first == list(range(8))
     resumed = make_network()
     with torch.no_grad():

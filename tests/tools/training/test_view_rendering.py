@@ -82,7 +82,7 @@ def tiny_house(seed: int) -> House:
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(views, "build", tiny_house)
+    monkeypatch.setattr(views, "generate_house", tiny_house)
     monkeypatch.setattr(views, "WIDTH", 64)
     monkeypatch.setattr(views, "HEIGHT", 48)
 
@@ -116,7 +116,7 @@ def test_same_seed_same_bytes(tmp_path: Path) -> None:
 
 
 def test_a_finished_shard_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(views, "build", None)  # would fail when called
+    monkeypatch.setattr(views, "generate_house", None)  # would fail when called
     (tmp_path / "20003").mkdir()
     assert render_house(20003, 3, tmp_path) == tmp_path / "20003"
     assert list((tmp_path / "20003").iterdir()) == []
