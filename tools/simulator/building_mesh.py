@@ -1,6 +1,7 @@
-"""The building itself as meshes: walls with their holes, parapets, slabs, ceilings, and what covers them in each room.
+"""Meshes of the building: walls with openings, parapets, slabs, ceilings, and the surface finish of each room.
 
-World frame, metres. The wall's own faces lie a little behind those of the linings, which are what one sees.
+World frame, metres. The faces of a wall's core lie a little behind the finish of the rooms, which is what a camera
+sees.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from placegraph.tools.simulator.house_model import Floor, Material, Part, WallOp
 from placegraph.tools.simulator.mesh_primitives import box
 from placegraph.tools.simulator.surface_finishes import Finish, building_material, room_finish, trim_material
 
-BEHIND_M = 0.003  # the wall's own faces behind the linings, the slab's below the floor
+BEHIND_M = 0.003  # the wall core behind the wall finish, the slab below the floor
 PARAPET_HIGH_M = 1.0
 BASEBOARD_M = (0.012, 0.07)  # thickness, height
 CASING_M = (0.07, 0.016)  # of doors and archways: width, thickness
@@ -27,7 +28,7 @@ Band = tuple[float, float, float, float]  # start, end along a wall, low, high
 
 @dataclass(frozen=True, eq=False)
 class FloorShape:
-    """One floor with its openings, the slab below it, and the wells in its own slab and in the one above."""
+    """One floor with its openings, the slab below it, and the stair wells in its own slab and in the one above."""
 
     floor: Floor
     grid: FloorWalls
@@ -57,7 +58,7 @@ def building_parts(random: np.random.Generator, shape: FloorShape) -> list[Part]
 
 
 def split_into_rectangles(polygon: F64, holes: tuple[F64, ...]) -> list[Rectangle]:
-    """An axis-aligned polygon (N, 2) less rectangular holes, as rectangles: whole columns where possible."""
+    """An axis-aligned polygon (N, 2) minus rectangular holes as rectangles, merged along y where possible."""
     corners = np.concatenate((polygon, *holes))
     xs, ys = np.unique(corners[:, 0]), np.unique(corners[:, 1])
     rectangles = []
@@ -81,7 +82,7 @@ def _contains(polygon: F64, x: float, y: float) -> bool:
 
 
 def subtract_rectangles(whole: Band, holes: list[Band]) -> list[Band]:
-    """An upright rectangle less rectangles, as rectangles."""
+    """A wall rectangle minus its openings, as rectangles."""
     start, end, low, high = whole
     cuts = sorted({start, end, *(min(max(value, start), end) for hole in holes for value in hole[:2])})
     pieces = []
@@ -103,7 +104,7 @@ def _opening_bands(holes: list[WallOpening], z_m: float) -> list[Band]:
 
 
 def _wall_core(shape: FloorShape, line: WallLine, holes: list[WallOpening], material: Material) -> list[Part]:
-    """A wall's boxes around its holes; it reaches half its joints' thickness beyond both ends, to fill the corners."""
+    """The boxes of a wall around its openings, extended at both ends to fill the corners."""
     floor, half = shape.floor, line.thickness_m / 2 - BEHIND_M
     ends = [_reach_beyond_end(shape.grid, line, end) for end in (line.start_m, line.end_m)]
     whole = (line.start_m - ends[0], line.end_m + ends[1], floor.z_m - 0.002, floor.z_m + floor.height_m)
@@ -115,7 +116,7 @@ def _wall_core(shape: FloorShape, line: WallLine, holes: list[WallOpening], mate
 
 
 def _reach_beyond_end(grid: FloorWalls, line: WallLine, end: float) -> float:
-    """Half the thickness of the wall that crosses a line's end."""
+    """Half the thickness of the wall that crosses at the end of a line, so that corners are filled."""
     for crossing in grid.lines:
         crosses = crossing.start_m - 1e-6 <= line.at_m <= crossing.end_m + 1e-6
         if crossing.axis != line.axis and abs(crossing.at_m - end) < 1e-6 and crosses and not crossing.parapet:
@@ -126,7 +127,7 @@ def _reach_beyond_end(grid: FloorWalls, line: WallLine, end: float) -> float:
 def _parapet(line: WallLine, z_m: float, body: Material, rail: Material) -> list[Part]:
     """A low wall with a rail on top."""
     half, top = line.thickness_m / 2, z_m + PARAPET_HIGH_M
-    # beyond its ends by its own half: closes the corner of two parapets, ends within a wall elsewhere
+    # extended by half its thickness, which closes the corner of two parapets
     low, high = line.point(line.start_m - half, -half), line.point(line.end_m, half)
     parts = [box((*low, z_m - 0.002), (*high, top - 0.04), body)]
     low, high = line.point(line.start_m - half, -half - 0.01), line.point(line.end_m, half + 0.01)
@@ -179,7 +180,7 @@ def _room_sides(shape: FloorShape, room: int) -> list[CellSide]:
 
 
 def _wall_linings(shape: FloorShape, room: int, finish: Finish) -> list[Part]:
-    """The walls' faces towards a room: one material below finish.dado_m, another above."""
+    """The wall faces of a room: one material below finish.dado_m, another above."""
     z, top = shape.floor.z_m, shape.floor.z_m + shape.floor.height_m
     parts = []
     for material, low, high in ((finish.dado, z, z + finish.dado_m), (finish.wall, z + finish.dado_m, top)):
@@ -196,7 +197,7 @@ def _wall_linings(shape: FloorShape, room: int, finish: Finish) -> list[Part]:
 
 
 def _vertical_quad(side: CellSide, piece: Band, proud_m: float = 0.0) -> list[tuple[float, float, float]]:
-    """A quad on a side's face, or so far before it, that faces into the room."""
+    """A quad on the face of a side, or `proud_m` in front of it, that faces into the room."""
     start, end, low, high = piece
     across = side.at_m + side.inward * proud_m
     (ax, ay), (bx, by) = ((start, across), (end, across)) if side.axis == 0 else ((across, start), (across, end))
@@ -206,7 +207,7 @@ def _vertical_quad(side: CellSide, piece: Band, proud_m: float = 0.0) -> list[tu
 
 
 def _strip_box(side: CellSide, piece: Band, thick_m: float, material: Material) -> Part:
-    """A box on a side's face."""
+    """A box on the face of a side."""
     ground = side.strip(piece[0], piece[1], thick_m)
     return box((ground.x0, ground.y0, piece[2]), (ground.x1, ground.y1, piece[3]), material)
 
@@ -222,7 +223,7 @@ def _baseboards(shape: FloorShape, room: int, material: Material) -> list[Part]:
 
 
 def _beams(shape: FloorShape, room: int, finish: Finish) -> list[Part]:
-    """Beams below the ceiling across a rectangular room, where it has them; never across a stair well."""
+    """Ceiling beams across a rectangular room, if its finish has any; none across a stair well."""
     polygon = shape.grid.polygons[room]
     welled = shape.well_above is not None and _contains(polygon, *shape.well_above.mean(axis=0).tolist())
     if finish.beam is None or len(polygon) != 4 or welled:
@@ -255,7 +256,7 @@ def _thresholds(shape: FloorShape, material: Material) -> list[Part]:
 
 
 def _casings(random: np.random.Generator, shape: FloorShape, material: Material) -> list[Part]:
-    """Frames around doors and most archways, on both faces of the wall, and sills below windows."""
+    """Frames around doors and most archways on both faces of the wall, and sills below windows."""
     z, (wide, thick), parts = shape.floor.z_m, CASING_M, []
     framed = bool(random.random() < 0.8)
     for side in shape.grid.sides:

@@ -1,7 +1,7 @@
-"""What an OAK-D makes of a rendered view: its colour camera's exposure and noise, and its passive stereo's depth.
+"""Noise model of an OAK-D: exposure and noise of the colour camera, and depth by passive stereo.
 
-Stereo measures disparity, focal length times baseline over depth: a constant error in disparity is an error in depth
-that grows with the square of the distance. It fails where it cannot match (edges, glare, blank and grazing surfaces).
+Stereo measures disparity, which is focal length times baseline over depth. A constant error in disparity is a depth
+error that grows with the square of the distance. Matching fails at edges, glare, and blank or grazing surfaces.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ NATIVE_WIDTH_PX = 640  # disparities below are in pixels of the mono cameras' 64
 
 @dataclass(frozen=True, eq=False)
 class RenderedView:
-    """One noise-free picture: color (H, W, 3) uint8 sRGB, depth_m (H, W) float32 along the optical axis with 0 where
-    nothing is hit, instance (H, W) uint16 item id + 1 with 0 for the building, and shine (H, W) uint8: the greater of
-    gloss and glow, times 255, where stereo finds little to match.
+    """One noise-free rendering.
+
+    color (H, W, 3) uint8 sRGB; depth_m (H, W) float32 along the optical axis, 0 where nothing is hit; instance (H, W)
+    uint16, item id + 1, 0 for the building; shine (H, W) uint8, the greater of gloss and glow times 255, where stereo
+    finds little to match.
     """
 
     color: U8
@@ -33,13 +35,13 @@ class RenderedView:
 
 @dataclass(frozen=True)
 class SensorSettings:
-    """How good the camera is; the defaults imitate an OAK-D indoors. What names no source is chosen, not measured."""
+    """Quality of the camera. The defaults imitate an OAK-D indoors; values without a source are chosen by hand."""
 
     # colour, in 8 bit levels after the camera's own processing
-    exposure: float = 1.0  # the house's own: see house_settings
+    exposure: float = 1.0  # differs by house, see sensor_settings
     white: tuple[float, float] = (1.0, 1.0)  # gains of red and blue that white balance leaves
     target_level: float = 118.0  # auto exposure steers the mean towards 18 % grey
-    adaption: float = 0.6  # how much of the way it goes
+    adaption: float = 0.6  # share of the way to the target level
     read_levels: float = 1.2
     shot_levels: float = 2.2  # at level 255; grows with the square root of the light
     vignette: float = 0.14  # share of light lost in the corners of a 69 degree lens
@@ -50,7 +52,7 @@ class SensorSettings:
     noise_px: float = 0.09  # sigma of disparity on a well textured surface, before rounding
     nearest_m: float = 0.35  # 400P: 441 px * 0.075 m / 95 px of search
     farthest_m: float = 9.0
-    # where matching fails: shares of the pixels concerned, set so that 85 to 95 % of a furnished room stay valid
+    # failed matches, as shares of the pixels; chosen so that 85 to 95 % of a furnished room stay valid
     edge_share: float = 0.45
     fat_share: float = 0.45  # of edges where the nearer surface grows by up to two pixels
     blank_share: float = 0.075
@@ -59,7 +61,7 @@ class SensorSettings:
 
 
 def sensor_settings(seed: int) -> SensorSettings:
-    """The camera as it is set up in one house: exposure and white balance differ from house to house."""
+    """The settings of one house: exposure and white balance differ from house to house."""
     random = np.random.default_rng([seed, 7101])
     red, blue = random.normal(1, 0.025, 2).tolist()
     return SensorSettings(exposure=float(np.exp(random.normal(0, 0.1))), white=(red, blue))
@@ -71,12 +73,9 @@ DEFAULT_SETTINGS = SensorSettings()
 def simulate_camera(
     view: RenderedView, intrinsics: F64, random: np.random.Generator, settings: SensorSettings = DEFAULT_SETTINGS
 ) -> tuple[U8, F32]:
-    """The camera's picture of a view: color (H, W, 3) uint8 and depth_m (H, W) float32 along the axis, 0 unknown.
+    """Colour (H, W, 3) uint8 and depth (H, W) float32 metres along the axis, 0 unknown, as the camera gives them.
 
-    `intrinsics` are fx fy cx cy in pixels.
-
-    Raises:
-        SourceError: the view's arrays do not have one size.
+    `intrinsics` are fx fy cx cy in px. Raises SourceError when the arrays of the view differ in size.
     """
     if view.color.shape[:2] != view.depth_m.shape or view.shine.shape != view.depth_m.shape:
         raise SourceError(f"a view's colour {view.color.shape} and depth {view.depth_m.shape} are of different sizes")
@@ -93,7 +92,7 @@ def _add_color_noise(color: U8, random: np.random.Generator, settings: SensorSet
     drift = random.normal(1, 0.008, 2)
     x, y = np.linspace(-1, 1, width, dtype=np.float32), np.linspace(-1, 1, height, dtype=np.float32)[:, None]
     falloff = gain * (1 - np.float32(settings.vignette / 2) * (x * x + y * y))
-    # noise depends on the light: the sigma of a pixel is read off by its green level
+    # the sigma of a pixel follows from its green level
     levels = np.arange(256, dtype=np.float32)
     sigma = np.sqrt(settings.read_levels**2 + settings.shot_levels**2 * levels / 255) * np.sqrt(max(gain, 0.7))
     strength = cv2.LUT(blurred[..., 1], sigma.astype(np.float32))
@@ -138,7 +137,7 @@ def _unmatched_pixels(
     view: RenderedView, color: U8, true: F32, edge: U8, fat_edge: U8, focal_px: float, random: np.random.Generator,
     settings: SensorSettings,
 ) -> Bool:  # fmt: skip
-    """(H, W) where stereo finds no match: blobs on blank, over-exposed and shiny surfaces, edges, grazing views."""
+    """(H, W) where stereo finds no match: blobs on blank, overexposed and shiny surfaces, edges, grazing views."""
     shape = true.shape
     blob = _smooth_noise(random, shape, 12) * np.float32(0.85) + _smooth_noise(random, shape, 4) * np.float32(0.53)
     shiny = view.shine.astype(np.float32) * np.float32(1 / 255)
@@ -157,7 +156,7 @@ def _unmatched_pixels(
 
 
 def _textureless(color: U8) -> F32:
-    """(H, W) 1 where the picture has no detail to match, 0 from a contrast of two dozen levels around the pixel."""
+    """(H, W) 1 where the image has no detail to match, 0 from a contrast of about 24 levels around the pixel."""
     grey = cv2.blur(color[..., 1], (3, 3))
     contrast = cv2.blur(cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)), (9, 9))
     return np.asarray(np.clip(1 - (contrast.astype(np.float32) - 5) * np.float32(1 / 18), 0, 1), np.float32)
@@ -172,12 +171,12 @@ def _smooth_noise(random: np.random.Generator, shape: tuple[int, ...], step: int
 
 
 def _quantile(share: float) -> np.float32:
-    """How many sigmas of a normal field leave `share` of it above."""
+    """The number of sigmas above which a normal field has `share` of its values."""
     return np.float32(_UPPER_QUANTILES[int(np.clip(share * 200, 0, 199))])
 
 
 def _upper_quantiles() -> F32:
-    """The upper quantiles of the normal distribution for shares of 0, 1/200 ... of the pixels; none for 0."""
+    """Upper quantiles of the normal distribution for shares of 0, 1/200, ... of the pixels; 9 sigma for 0."""
     shares = [NormalDist().inv_cdf(1 - k / 200) for k in range(1, 200)]
     return np.array([9.0, *shares], np.float32)
 

@@ -1,7 +1,7 @@
-"""The walk of a camera through a house, as of a person who maps it: every room of every floor, and up all stairs.
+"""The camera trajectory of a person who maps a house: every room of every floor, and up all stairs.
 
-On each floor the robot goes from lookout to lookout; at each it turns until it has seen what the lookout shows. World
-frame: metres, z up. Camera frame: x right, y down, z forward.
+On each floor the robot goes from survey spot to survey spot and turns at each until it has seen what is visible there.
+World frame: metres, z up. Camera frame: x right, y down, z forward.
 """
 
 from __future__ import annotations
@@ -30,23 +30,25 @@ from placegraph.tools.simulator.robot_navigation import (
     wrap_angle,
 )
 
-SALT = 4_201  # sets the walk's randomness apart from that of plan and furniture
+SALT = 4_201  # a random stream of its own
 CELL_M = 0.05
 RADIUS_M = 0.25  # of the robot
-EYE_M = (1.25, 1.4)  # camera above the floor, at least and at most
+EYE_M = (1.25, 1.4)  # lowest and highest camera above the floor
 NO_ROOM = -1  # of a frame on the stairs
 
-HALF_VIEW = np.radians(30.0)  # to either side; a little less than the camera's, so nothing stays at the image's edge
-TURN_COST = 1.0 / np.radians(120.0)  # worth of a radian of turning
-DEPTH_COST = 1.0  # worth of a metre further into the room
-MIN_STEPS_INSIDE = 12  # points of a path, .02 m each, that the robot goes into a room at least
-MIN_SPOT_SHARE, MIN_SPOT_WORTH = 0.15, 2.5  # a further lookout must show at least this share of a room, and this worth
+HALF_VIEW = np.radians(
+    30.0
+)  # to either side; slightly less than the camera's, so that targets are not at the image border
+TURN_COST = 1.0 / np.radians(120.0)  # worth lost per radian of turning
+DEPTH_COST = 1.0  # worth lost per metre into the room
+MIN_STEPS_INSIDE = 12  # path points, .02 m apart, that the robot enters a room at least
+MIN_SPOT_SHARE, MIN_SPOT_WORTH = 0.15, 2.5  # smallest share of a room, and worth, that a further spot must show
 STAIR_TILT = np.radians(6.0)  # looking at the steps
 STAIR_REACH_M = 0.8  # from a step before or after a flight to the nearest free cell
 
 
 class CameraTrajectory(NamedTuple):
-    """Camera poses along the way: stamps_ns (N,) int64 from 0, world_from_camera (N, 4, 4) metres."""
+    """Camera poses: stamps_ns (N,) int64 from 0, world_from_camera (N, 4, 4) in metres."""
 
     stamps_ns: I64
     world_from_camera: F64
@@ -54,7 +56,7 @@ class CameraTrajectory(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SurveySpot:
-    """A spot (2,) from which much of a room is seen, and the ways to it."""
+    """A spot (2,) from which much of a room is visible, and the routes to it."""
 
     visibility: RoomVisibility
     xy: F64
@@ -66,14 +68,13 @@ class _SurveyState:
     house: House
     motion: RobotMotion
     eye_m: float  # camera above the floor
-    processed_samples: int = 0  # samples whose view has been taken into account
+    processed_samples: int = 0  # samples already counted as seen
 
 
 def camera_trajectory(house: House, seed: int, rate_hz: float = 10.0) -> CameraTrajectory:
-    """The walk of a seed through a house, rate_hz frames a second.
+    """The trajectory of a seed through a house, `rate_hz` frames a second.
 
-    Raises:
-        SourceError: a room or a flight of stairs cannot be reached.
+    Raises SourceError when a room or a flight of stairs cannot be reached.
     """
     random = np.random.default_rng([seed, SALT])
     grounds = [floor_free_space(house, floor) for floor in house.floors]
@@ -98,7 +99,7 @@ def camera_trajectory(house: House, seed: int, rate_hz: float = 10.0) -> CameraT
 
 
 def items_in_view(house: House, trajectory: CameraTrajectory, half_view: tuple[float, float] = (0.6, 0.47)) -> Bool:
-    """Whether the middle of each item (I,) was in view, .5 to 4.5 m ahead; half_view in radians, across and upright."""
+    """(I,) whether the centre of each item was in view, .5 to 4.5 m ahead; half_view in radians, across and upright."""
     result = np.zeros(len(house.items), bool)
     camera_from_world = np.linalg.inv(trajectory.world_from_camera)
     for k, item in enumerate(house.items):
@@ -109,7 +110,7 @@ def items_in_view(house: House, trajectory: CameraTrajectory, half_view: tuple[f
 
 
 def rooms_of_frames(house: House, world_from_camera: F64) -> I64:
-    """(N,) the Room.id of each camera pose (N, 4, 4), NO_ROOM on stairs; in a doorway that of the room it leaves."""
+    """(N,) Room.id of each camera pose (N, 4, 4), NO_ROOM on stairs; in a doorway the room that is being left."""
     xyz = world_from_camera[:, :3, 3]
     rooms = np.full(len(xyz), NO_ROOM, np.int64)
     for floor in house.floors:
@@ -122,7 +123,7 @@ def rooms_of_frames(house: House, world_from_camera: F64) -> I64:
 
 
 def floor_free_space(house: House, floor: Floor) -> FreeSpace:
-    """The ground of a floor; every room must be part of what hangs together."""
+    """The free space of a floor. Raises SourceError unless all its rooms are connected."""
     free_space = build_free_space(*free_grid(house, floor.index, cell_m=CELL_M, radius_m=RADIUS_M), CELL_M)
     places = free_space.middles(np.flatnonzero(free_space.reachable))
     for room in floor.rooms:
@@ -132,7 +133,7 @@ def floor_free_space(house: House, floor: Floor) -> FreeSpace:
 
 
 def _survey_spots(state: _SurveyState, floor: Floor, room: Room, free_space: FreeSpace) -> list[SurveySpot]:
-    """The spots from which a room is surveyed, the one that shows most first."""
+    """The spots from which a room is surveyed, the one with the largest view first."""
     visibility = room_visibility(state.house, floor, room)
     cells = np.flatnonzero(free_space.reachable)
     cells = cells[points_in_polygon(room.polygon, free_space.middles(cells))]
@@ -158,7 +159,7 @@ def _survey_spots(state: _SurveyState, floor: Floor, room: Room, free_space: Fre
 
 
 def _survey_floor(state: _SurveyState, floor: Floor, free_space: FreeSpace, end: RouteField | None) -> None:
-    """Goes to all lookouts of a floor, looks around at each, and ends where the ways `end` lead."""
+    """Visits all survey spots of a floor, looks around at each, and ends at the goal of `end`."""
     remaining = [spot for room in floor.rooms for spot in _survey_spots(state, floor, room, free_space)]
     visibilities = list(dict.fromkeys(spot.visibility for spot in remaining))
     while remaining:
@@ -185,7 +186,7 @@ def _survey_floor(state: _SurveyState, floor: Floor, free_space: FreeSpace, end:
 
 
 def _next_spot(remaining: list[SurveySpot], cell: int) -> int:
-    """Which lookout to go to next: the nearest, but rooms that one passes through anyway wait to the last."""
+    """Index of the spot to visit next: the nearest, except that rooms with three passages or more come last."""
     return int(
         np.argmin(
             [
@@ -197,7 +198,7 @@ def _next_spot(remaining: list[SurveySpot], cell: int) -> int:
 
 
 def _heading(path: F64) -> float:
-    """The heading towards what of a path lies .8 m ahead."""
+    """The heading towards the point of a path .8 m ahead, radians."""
     way = path[min(40, len(path) - 1)] - path[0]
     return float(np.arctan2(way[1], way[0]))
 
@@ -211,9 +212,9 @@ def _follow(state: _SurveyState, path: F64, z_m: float) -> None:
 
 
 def _look_around(state: _SurveyState, spot: SurveySpot, free_space: FreeSpace, follower: RouteField | None) -> None:
-    """Turns, on a small circle where there is room, by what shows most of the unseen for least turning."""
+    """Turns, on a small circle where there is space, to see the most unseen targets for the least turning."""
     motion = state.motion
-    turns = [float(turn) for turn in np.radians((0, 90, -90, 180, -180, 270, -270, 330))]  # of the last look of all
+    turns = [float(turn) for turn in np.radians((0, 90, -90, 180, -180, 270, -270, 330))]  # for the last spot
     if follower is not None:
         turn = wrap_angle(_heading(route(free_space, follower, motion.xyz[:2])) - motion.heading)
         turns = [turn, turn - 2 * np.pi, turn + 2 * np.pi]
@@ -231,7 +232,7 @@ def _look_around(state: _SurveyState, spot: SurveySpot, free_space: FreeSpace, f
 
 
 def _update_seen(state: _SurveyState, visibilities: list[RoomVisibility]) -> None:
-    """Takes into account what the robot has seen, from inside of each room, since the last time."""
+    """Marks the targets that the robot has seen from inside each room since the last call."""
     samples = np.array(state.motion.samples[state.processed_samples :: 10]).reshape(-1, 6)
     state.processed_samples = len(state.motion.samples)
     for visibility in visibilities:
@@ -244,7 +245,7 @@ def _update_seen(state: _SurveyState, visibilities: list[RoomVisibility]) -> Non
 
 
 def _start_position(house: House, free_space: FreeSpace) -> F64:
-    """(2,) where the walk starts: by the entrance, or else in the hallway, the living room, or the first room."""
+    """(2,) where the trajectory starts: at the entrance, else in the hallway, the living room or the first room."""
     floor = house.floors[0]
     for wall in floor.walls:
         for opening in wall.openings:
@@ -258,7 +259,7 @@ def _start_position(house: House, free_space: FreeSpace) -> F64:
 
 
 def landing_cell(house: House, flight: Staircase, free_space: FreeSpace, up: bool) -> int:
-    """The free cell from which a flight is climbed, or, `up`, onto which one steps at its head."""
+    """The free cell in front of the foot of a flight, or with `up` behind its head. Raises SourceError when blocked."""
     way = (flight.head - flight.foot)[:2] / np.linalg.norm((flight.head - flight.foot)[:2])
     end = flight.head[:2] + 0.35 * way if up else flight.foot[:2] - 0.35 * way
     cell = free_space.nearest(end)
@@ -270,13 +271,13 @@ def landing_cell(house: House, flight: Staircase, free_space: FreeSpace, up: boo
 
 
 def _climb_stairs(state: _SurveyState, flight: Staircase, landing: F64) -> None:
-    """From the landing below up the flight to the landing (3,) above."""
+    """Moves from the lower landing up the flight to the landing (3,) above."""
     state.motion.follow(np.stack((state.motion.xyz, flight.foot, flight.head, landing)), STAIR_TILT)
     state.processed_samples = len(state.motion.samples)
 
 
 def _camera_frames(state: _SurveyState, random: np.random.Generator, rate_hz: float) -> CameraTrajectory:
-    """The frames of a tour: its samples at rate_hz, with the sway of a walking camera."""
+    """The trajectory sampled at rate_hz, with the sway of a walking camera."""
     samples = np.array(state.motion.samples)
     ticks = np.arange(len(samples)) * STEP_S
     stamps = np.arange(int(ticks[-1] * rate_hz) + 1) / rate_hz

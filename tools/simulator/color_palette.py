@@ -1,4 +1,4 @@
-"""Colours by the words people use for them."""
+"""Colours by the words that people use for them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MUTED = ("white", "black", "gray", "brown", "beige", "blue", "green")
 
 
 def jitter(color: Color, random: np.random.Generator, sigma: float = 9.0) -> Color:
-    """A colour near another one: brightness and hue vary, the word for it does not."""
+    """A similar colour: brightness and hue vary, the colour word stays true."""
     shift = random.normal(0, sigma) + random.normal(0, sigma / 3, 3)
     r, g, b = np.clip(np.round(np.array(color) + shift), 6, 249).astype(int).tolist()
     return (r, g, b)
@@ -44,13 +44,13 @@ def jitter(color: Color, random: np.random.Generator, sigma: float = 9.0) -> Col
 def pick(
     random: np.random.Generator, names: Sequence[str] = MUTED, colors: dict[str, Color] | None = None
 ) -> tuple[str, Color]:
-    """One of the named colours, a little varied: its word and value."""
+    """One of the named colours, slightly varied: its word and sRGB value."""
     table = COLORS if colors is None else colors
     name = str(random.choice(list(names)))
     return name, jitter(table[name], random)
 
 
 def darker(color: Color, share: float = 0.7) -> Color:
-    """The same hue, darker (share below 1) or lighter (above)."""
+    """The same hue scaled in brightness: darker for a share below 1, lighter above."""
     r, g, b = np.clip(np.array(color) * share, 0, 255).astype(int).tolist()
     return (r, g, b)

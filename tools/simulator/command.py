@@ -1,4 +1,4 @@
-"""Make a house: a furnished building from a seed, filmed on a walk through it, as a folder to map and to score."""
+"""`placegraph house`: generate a furnished house from a seed and film it, as a folder to map and to score."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def house(
 
 
 def _already_there(out: Path, order: HouseOrder, replace: bool) -> HouseRun | None:
-    """What made the folder when it is just what is asked for; None when there is nothing; raises ConfigError else.
+    """The run of an existing folder that matches the order; None when there is no folder yet.
 
-    `replace`: another house folder, whole or not, is removed; anything else never is.
+    `replace` removes another house folder, complete or not. Raises ConfigError when `out` holds anything else.
     """
     if out.is_dir() and any(out.iterdir()):
         run = read_house_run(out)

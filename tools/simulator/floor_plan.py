@@ -1,6 +1,6 @@
-"""The floor plans of a house: rooms, walls with openings, stairs, doors and windows, everything from one seed.
+"""Floor plans of a house from a seed: rooms, walls with openings, stairs, doors and windows.
 
-A hall along the house holds the stairs and leads to the rooms of two rows; see plan_scheme.
+A hall along the house holds the stairs and leads to two rows of rooms; see floor_plan_rooms.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from placegraph.tools.simulator.house_model import (
     WallOpening,
 )
 
-SALT = 1_301  # sets the plan's randomness apart from that of furniture and walk
+SALT = 1_301  # a random stream of its own
 MAX_FLOORS = 3
 ATTEMPTS = 300
 LIGHT_BELOW_M = 0.25
@@ -51,7 +51,7 @@ LIGHT_BELOW_M = 0.25
 
 @dataclass(frozen=True, eq=False)
 class _Storey:
-    """One floor of a plan that works out, before it has a height."""
+    """One floor of a valid plan, before it has a height."""
 
     cells: list[RoomCell]
     grid: FloorWalls
@@ -59,9 +59,9 @@ class _Storey:
 
 
 def generate_floor_plan(seed: int, floors: int | None = None) -> House:
-    """The unfurnished house of a seed, of so many floors (None: the seed chooses 1 to 3, mostly 2).
+    """The unfurnished house of a seed with `floors` floors (None: the seed chooses 1 to 3, mostly 2).
 
-    Raises ConfigError for a number of floors that is not 1, 2 or 3, or a negative seed.
+    Raises ConfigError for a number of floors other than 1, 2 or 3, or a negative seed.
     """
     if floors is not None and not 1 <= floors <= MAX_FLOORS:
         raise ConfigError(f"a house has 1 to {MAX_FLOORS} floors, not {floors}")
@@ -77,7 +77,7 @@ def generate_floor_plan(seed: int, floors: int | None = None) -> House:
 
 
 def _plan(random: np.random.Generator, count: int) -> tuple[list[_Storey], list[Flight]] | None:
-    """All floors in the world's plane; None when a room finds no place or no door."""
+    """All floors in the plane of the world; None when a room finds no place or no door."""
     common = house_shell(random, count)
     swap, mirror_x, mirror_y = (random.random(3) < 0.5).tolist()
     turn = FrameTransform(swap, mirror_x, mirror_y, common.width_m, common.depth_m)
@@ -100,7 +100,7 @@ def _plan(random: np.random.Generator, count: int) -> tuple[list[_Storey], list[
 
 
 def _stair_footprints(flights: list[Flight], floor: int) -> list[Rectangle]:
-    """The ground that a flight of this floor stands on."""
+    """The footprints of the flights that start on this floor."""
     return [flight.treads for flight in flights if flight.floor == floor]
 
 
@@ -134,7 +134,7 @@ def _build_house(random: np.random.Generator, seed: int, storeys: list[_Storey],
 
 
 def _walls(storey: _Storey, first_room: int) -> tuple[Wall, ...]:
-    """The full-height walls, openings measured from each wall's start; parapets are structure only."""
+    """The full-height walls, openings measured from the start of each wall; parapets are structure only."""
     walls = []
     for index, line in enumerate(storey.grid.lines):
         if not line.parapet:
@@ -159,7 +159,7 @@ def _stairs(flight: Flight, levels: list[float], well: F64 | None) -> Staircase:
 def _built_in_items(
     random: np.random.Generator, storeys: list[_Storey], floors: list[Floor], flights: list[Flight]
 ) -> tuple[PlacedItem, ...]:
-    """Flights, door leaves and windows, floor by floor."""
+    """Flights of stairs, door leaves and windows, floor by floor."""
     items: list[PlacedItem] = []
 
     def place(item: Item, xy: tuple[float, float], z: float, yaw: float, room: int, support: int) -> None:
@@ -188,7 +188,7 @@ def _built_in_items(
 def _window(
     random: np.random.Generator, grid: FloorWalls, side: CellSide, hole: WallOpening, z_m: float
 ) -> tuple[Item, tuple[float, float], float, float]:
-    """A window that fills its opening, near the outer face, its front to the room: item, (x, y), z, yaw."""
+    """A window that fills its opening near the outer face and faces the room: item, (x, y), z, yaw."""
     line, depth = grid.lines[side.line], 0.08
     sizes = (hole.end_m - hole.start_m - 0.004, hole.high_m - hole.low_m - 0.004)
     item = design("window", random, width_m=sizes[0], depth_m=depth, height_m=sizes[1])
@@ -199,7 +199,7 @@ def _window(
 
 
 def _lights(shape: FloorShape) -> list[tuple[float, float, float]]:
-    """Below the middle of each room's largest rectangle, two in a long one."""
+    """Lamp positions below the middle of each room's largest rectangle, two in a long one."""
     lights = []
     z = shape.floor.z_m + shape.floor.height_m - LIGHT_BELOW_M
     for room in shape.floor.rooms:

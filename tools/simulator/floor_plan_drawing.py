@@ -1,4 +1,4 @@
-"""A labelled plan of a house, floors side by side: rooms, walls, openings, stairs, furniture, the camera's path."""
+"""A labelled drawing of the floor plans, side by side: rooms, walls, openings, stairs, furniture, camera path."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BUILT_IN = ("door", "window", "stairs")  # drawn, but not named: they are part o
 
 @dataclass(frozen=True, eq=False)
 class PlanSheet:
-    """The image of one floor, and where its world lies on it."""
+    """The image of one floor and the transform from world to pixels."""
 
     image: U8  # (H, W, 3) RGB
     low: F64  # (2,) world x and y of the left bottom corner, in metres
@@ -97,7 +97,7 @@ def _draw_floor(sheet: PlanSheet, labels: LabelLayout, house: House, floor: Floo
 
 
 def tint(room_type: str) -> Color:
-    """The light colour of a type of room; types without one of their own share a few."""
+    """The light colour of a room type; types without their own colour share a few."""
     return TINTS.get(room_type, OTHER_TINTS[sum(room_type.encode()) % len(OTHER_TINTS)])
 
 
@@ -171,7 +171,7 @@ def _draw_path(sheet: PlanSheet, house: House, floor: Floor, path: F64) -> None:
 
 
 def _name_room(sheet: PlanSheet, labels: LabelLayout, room: Room, items: list[PlacedItem]) -> None:
-    """Write its type where there is most free floor."""
+    """Writes the room type where there is most free floor."""
     height, width = sheet.image.shape[:2]
     free = np.zeros((height, width), np.uint8)
     cv2.fillPoly(free, [np.round(sheet.px(room.polygon)).astype(np.int32)], 1)

@@ -11,22 +11,22 @@ from placegraph.tools.simulator.floor_plan_walls import OUTSIDE, CellSide, Floor
 from placegraph.tools.simulator.house_model import WallOpening
 
 DOOR_HIGH_M = 2.05
-JAMB_M = 0.12  # of wall at least between an opening and a corner
-APART_M = 0.25  # of wall at least between two openings
-FREE_BEFORE_OPENING_M = 0.8  # nothing of the building stands nearer before an opening
+JAMB_M = 0.12  # smallest wall between an opening and a corner
+APART_M = 0.25  # smallest wall between two openings
+FREE_BEFORE_OPENING_M = 0.8  # kept free of stairs and leaves in front of an opening
 LEAF_M = 0.04  # thickness of a door leaf
 PASS_THROUGH_ROOMS = (
     "living room",
     "dining room",
     "kitchen",
     "office",
-)  # rooms through which another may be entered, best first
-JOINED_ROOMS = ("living room", "dining room", "kitchen")  # rooms that like to be joined
+)  # rooms through which others may be entered, best first
+JOINED_ROOMS = ("living room", "dining room", "kitchen")  # rooms that are joined to each other with a probability
 
 
 @dataclass(frozen=True)
 class DoorLeaf:
-    """An open door leaf: the middle of its footprint, its yaw (hinges at the leaf's -x), its width, its room."""
+    """An open door leaf: centre of its footprint, yaw (hinges at the leaf's -x), width, room."""
 
     x: float
     y: float
@@ -38,11 +38,11 @@ class DoorLeaf:
 
 @dataclass(eq=False)
 class FloorOpenings:
-    """The openings of a floor by line, with coordinates along the line's axis, while they are being chosen."""
+    """The openings of a floor by wall line while they are chosen; coordinates are along the axis of the line."""
 
     grid: FloorWalls
     types: list[str]
-    blocked: list[Rectangle]  # flights and landings: no opening leads there
+    blocked: list[Rectangle]  # footprints of stairs, onto which no opening leads
     by_line: dict[int, list[WallOpening]] = field(default_factory=dict)
     doors: list[tuple[float, float, CellSide]] = field(default_factory=list)  # start, end, side of those to have a leaf
     leaves: list[DoorLeaf] = field(default_factory=list)
@@ -50,7 +50,7 @@ class FloorOpenings:
     def shared_spans(
         self, room: int, neighbour: int, margin_m: float = 0.0
     ) -> list[tuple[float, float, CellSide, CellSide]]:
-        """Free stretches of the walls that two rooms share, with the two sides, the longest first."""
+        """Free spans of the walls that two rooms share, with both sides, the longest first."""
         spans = []
         for side in self._sides(room):
             for back in self._sides(neighbour):
@@ -64,7 +64,7 @@ class FloorOpenings:
     def free_spans(
         self, ends: tuple[float, float], sides: tuple[CellSide, ...], margin_m: float = 0.0
     ) -> list[tuple[float, float]]:
-        """What is left of a stretch without other openings and what must not be opened onto."""
+        """A span of wall without existing openings and without the ground in front of stairs."""
         taken = [(hole.start_m - APART_M, hole.end_m + APART_M) for hole in self.by_line.get(sides[0].line, [])]
         for side in sides:
             before = side.strip(*ends, FREE_BEFORE_OPENING_M)
@@ -91,7 +91,7 @@ class FloorOpenings:
 
 
 def connect_rooms(random: np.random.Generator, openings: FloorOpenings) -> bool:
-    """Join every room to the hall, or through one that may be passed; False where a room cannot be reached."""
+    """Joins every room to the hall, directly or through another room; False when one stays unreachable."""
     types = openings.types
     hall = next(room for room, name in enumerate(types) if name in HALLS)
     inside = [hall]
@@ -111,7 +111,7 @@ def connect_rooms(random: np.random.Generator, openings: FloorOpenings) -> bool:
         for second in living_rooms:
             if first < second and (first, second) not in openings.joined_rooms() and random.random() < 0.65:
                 _cut_opening(random, openings, first, second, 0.85)
-    for start, end, side in openings.doors:  # when all openings are known, so that no leaf stands before one
+    for start, end, side in openings.doors:  # after all openings are known, so that no leaf blocks one
         _hang_leaf(random, openings, start, end, side)
     return len(inside) == len(types)
 
@@ -119,7 +119,7 @@ def connect_rooms(random: np.random.Generator, openings: FloorOpenings) -> bool:
 def _cut_opening(
     random: np.random.Generator, openings: FloorOpenings, room: int, neighbour: int, archway: float
 ) -> bool:
-    """Cut a door or, with a chance, an archway between two rooms; False when they share too little wall."""
+    """Cuts a door or, with a probability, an archway between two rooms; False when they share too little wall."""
     rooms = (min(room, neighbour), max(room, neighbour))
     for low, high, side, back in openings.shared_spans(room, neighbour):
         length = high - low - 2 * JAMB_M
@@ -142,7 +142,7 @@ def _cut_opening(
 
 
 def _door_start(random: np.random.Generator, span: tuple[float, float], width: float, side: CellSide) -> float:
-    """Mostly near a corner of the room, where the leaf finds its place along the wall there."""
+    """Mostly near a corner of the room, where the open leaf can stand along the wall."""
     gap = random.uniform(JAMB_M, 0.2)
     starts = []
     if abs(span[0] - side.start_m) < 0.05:
@@ -156,12 +156,12 @@ def _door_start(random: np.random.Generator, span: tuple[float, float], width: f
 
 
 def _hang_leaf(random: np.random.Generator, openings: FloorOpenings, start: float, end: float, side: CellSide) -> None:
-    """Hang the leaf in the room of `side` where it stands in nobody's way, if there is such a place."""
+    """Hangs the leaf in the room of `side` where it obstructs nothing, if there is such a position."""
     width = end - start - 0.03
     swing = float(random.uniform(90, 98))
     for hinge, way in ((start, 1), (end, -1)):
         corner = hinge - side.start_m if way > 0 else side.end_m - hinge
-        if corner <= 0.3:  # along the wall of the corner, or a little further
+        if corner <= 0.3:  # opens along the wall at the corner, or slightly further
             beyond_right_angle = (
                 float(np.degrees(np.arcsin(min((corner - 0.09) / width, 1.0)))) if corner > 0.09 else 0.0
             )
@@ -177,7 +177,7 @@ def _hang_leaf(random: np.random.Generator, openings: FloorOpenings, start: floa
 
 
 def _leaf(side: CellSide, hinge: float, way: int, angle: float, width: float) -> DoorLeaf:
-    """A leaf hinged at a coordinate of a side, opened by an angle from closed; `way` leads over the opening."""
+    """A leaf hinged at a coordinate of a side and opened by an angle; `way` is the direction over the opening."""
     u, n = np.zeros(2), np.zeros(2)
     u[side.axis], n[1 - side.axis] = way, side.inward
     at = np.zeros(2)
@@ -193,7 +193,7 @@ def _leaf(side: CellSide, hinge: float, way: int, angle: float, width: float) ->
 
 
 def _is_clear(openings: FloorOpenings, side: CellSide, leaf: DoorLeaf) -> bool:
-    """Whether a leaf is all inside its room and off other leaves, flights and the ground before other openings."""
+    """Whether a leaf is inside its room and clear of other leaves, stairs and the ground before other openings."""
     polygon = openings.grid.polygons[side.room]
     low, high = polygon.min(axis=0), polygon.max(axis=0)
     box = leaf.box_around
@@ -211,7 +211,7 @@ def _is_clear(openings: FloorOpenings, side: CellSide, leaf: DoorLeaf) -> bool:
 
 
 def add_windows(random: np.random.Generator, openings: FloorOpenings) -> None:
-    """Windows in outer walls, at least one in most rooms, none behind a flight or a leaf."""
+    """Adds windows to outer walls, at least one in most rooms, none behind stairs or a leaf."""
     low, high = float(random.uniform(0.7, 1.0)), float(random.uniform(2.05, 2.3))
     for room, name in enumerate(openings.types):
         chance = 1.0
@@ -230,7 +230,7 @@ def add_windows(random: np.random.Generator, openings: FloorOpenings) -> None:
 def _window_spans(
     random: np.random.Generator, openings: FloorOpenings, ends: tuple[float, float], side: CellSide, name: str
 ) -> list[tuple[float, float]]:
-    """One window, or two in a long wall."""
+    """The span of one window, or of two in a long wall."""
     count = 2 if ends[1] - ends[0] > 4.2 else 1
     max_width = 1.0 if name in ("bathroom", "laundry") else 2.0
     leaves = [leaf.box_around for leaf in openings.leaves if leaf.room == side.room]

@@ -1,6 +1,6 @@
-"""Which rooms a floor has and where: two rows of rooms along a hall, an end block, a corner left out.
+"""Which rooms a floor has and where: two rows of rooms along a hall, a room at its end, a corner left out.
 
-All in wall middle lines, metres, with the hall along x; `Turn` takes it to the world frame at the end.
+Metres, between the middle lines of walls, with the hall along x; `FrameTransform` takes this to the world frame.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Rectangle(NamedTuple):
 
 @dataclass(frozen=True)
 class RoomCell:
-    """A room between wall middle lines."""
+    """A room between the middle lines of its walls."""
 
     type: str
     place: Rectangle
@@ -57,7 +57,7 @@ class RoomCell:
 
 @dataclass(frozen=True)
 class Flight:
-    """A straight flight from `floor` up: its treads' rectangle, and the well that the floor above leaves open."""
+    """A straight flight of stairs from `floor` up: its treads' rectangle, and the well in the floor above."""
 
     floor: int
     foot: tuple[float, float]
@@ -68,7 +68,7 @@ class Flight:
 
 @dataclass(frozen=True)
 class HouseShell:
-    """What all floors share: depths of the south row, the hall and the north row (0: none), and the flights."""
+    """What all floors share: depths of the south row, the hall and the north row (0: none), and the stairs."""
 
     width_m: float
     south_m: float
@@ -86,7 +86,7 @@ class HouseShell:
 
 
 class RowExtent(NamedTuple):
-    """How far the rows of one floor reach along x, in metres."""
+    """How far the two rows of a floor reach along x, in metres."""
 
     south_to: float
     north_to: float
@@ -94,7 +94,7 @@ class RowExtent(NamedTuple):
 
 @dataclass(frozen=True)
 class FrameTransform:
-    """Takes the hall's frame to the world: x and y swapped, then mirrored."""
+    """From the frame of the hall to the world: x and y swapped, then mirrored."""
 
     swap: bool
     mirror_x: bool
@@ -120,7 +120,7 @@ class FrameTransform:
 
 
 def house_shell(random: np.random.Generator, floors: int) -> HouseShell:
-    """The measures of a house: with stairs the hall is wide enough for a flight, a parapet and a way past them."""
+    """The dimensions of a house; with stairs the hall is wide enough for a flight, a parapet and a passage."""
     outer, inner = round(random.uniform(0.2, 0.3), 2), round(random.uniform(0.1, 0.15), 2)
     if floors == 1:
         south, hall, north = random.uniform(3.2, 4.2), random.uniform(1.55, 1.95), random.uniform(3.0, 4.2)
@@ -144,7 +144,7 @@ def house_shell(random: np.random.Generator, floors: int) -> HouseShell:
 def _flights(
     floors: int, width: float, south: float, band: tuple[float, float], stair: float, run: float, outer: float
 ) -> tuple[Flight, ...]:
-    """The first flight rises from the hall's one end, the second from its other end."""
+    """The first flight rises from one end of the hall, the second from the other end."""
     low, high = south + band[0] + PARAPET_M / 2 + 0.01, south + band[0] + PARAPET_M / 2 + 0.01 + stair
     middle, flights = (low + high) / 2, []
     for floor in range(floors - 1):
@@ -159,7 +159,7 @@ def _flights(
 
 
 def row_extents(random: np.random.Generator, shell: HouseShell, floors: int) -> list[RowExtent]:
-    """How far the rows reach on each floor: a corner may be left out, and above it nothing is built."""
+    """How far the rows reach on each floor; a corner may be left out, and nothing is built above it."""
     row_ends = [RowExtent(shell.width_m, shell.width_m)]
     for floor in range(floors):
         last = row_ends[-1]
@@ -206,7 +206,7 @@ def arrange_rooms(
 def _fill_rows(
     random: np.random.Generator, shell: HouseShell, extent: RowExtent, names: list[str], ended: bool
 ) -> list[RoomCell] | None:
-    """The names in order as south and north row; `ended`: the last of a row lies across the hall's end."""
+    """The named rooms in order as south and north row; `ended`: the last room of a row lies across the hall's end."""
     split = int(random.integers(1, len(names))) if shell.north_m else len(names)
     rows, far = (names[:split], names[split:]), list(extent)
     cells = []
@@ -230,7 +230,7 @@ def _fill_rows(
 
 
 def _end_block(random: np.random.Generator, shell: HouseShell, name: str, row: int) -> RoomCell | None:
-    """A room at the end of the hall and of the south (0) or north (1) row; None when it does not fit."""
+    """A room across the end of the hall and of the south (0) or north (1) row; None when it does not fit."""
     low, high = (shell.south_m, shell.depth_m) if row else (0.0, shell.south_m + shell.hall_m)
     min_width, max_width = _width_range_m(name, high - low)
     beyond = [shell.width_m - flight.head[0] - LANDING_M - shell.outer_m for flight in shell.flights]
@@ -241,7 +241,7 @@ def _end_block(random: np.random.Generator, shell: HouseShell, name: str, row: i
 
 
 def _width_range_m(name: str, depth_m: float) -> tuple[float, float]:
-    """The least and the largest width between wall middles of a room that is so deep."""
+    """Smallest and largest width between wall middle lines of a room of a given depth."""
     min_area, max_area, side = ROOM_SIZES[name]
     inner = depth_m - WALL_M
     return max(min_area / inner, side, inner / 2.8) + WALL_M, min(max_area / inner, 2.3 * inner) + WALL_M
@@ -267,7 +267,7 @@ def _fill_row(
 
 
 def _has_hall_access(cell: RoomCell, hall: Rectangle, shell: HouseShell, floor: int) -> bool:
-    """Whether a private room shares enough of the hall's wall, beside flights and wells, for a door."""
+    """Whether a room that must open to the hall shares enough wall with it, clear of stairs, for a door."""
     place = cell.place
     if cell.type not in HALL_ENTERED_ROOMS or place.x0 == hall.x1:
         return True

@@ -1,6 +1,6 @@
-"""From the cells of a floor to its walls, the sides of its rooms and their polygons.
+"""From the cells of a floor to its walls, and the sides and polygon of each room.
 
-The cells are painted on a grid of all their edges; walls run where neighbouring fields differ. World frame, metres.
+The cells are painted on a grid of all their edges; a wall runs where neighbouring fields differ. World frame, metres.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import numpy as np
 from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.floor_plan_rooms import PARAPET_M, Rectangle, RoomCell
 
-OUTSIDE, WELL = -1, -2  # fields of the grid that are no room
-OPEN = -1  # Side.line where a room ends at the head of a flight
+OUTSIDE, WELL = -1, -2  # labels of fields that are not rooms
+OPEN = -1  # CellSide.line where a room ends at the head of stairs
 
 
 @dataclass(frozen=True)
 class WallLine:
-    """A straight wall: along x (axis 0) or y (1), at `at_m` on the other axis, from start to end between joints."""
+    """A straight wall along x (axis 0) or y (axis 1), at `at_m` on the other axis, from start to end between joints."""
 
     axis: int
     at_m: float
@@ -35,7 +35,7 @@ class WallLine:
 
 @dataclass(frozen=True)
 class SideStretch:
-    """A stretch of a room's side and what lies behind the wall: a room, OUTSIDE or WELL."""
+    """A stretch of a room's side and what is behind the wall: a room, OUTSIDE or WELL."""
 
     behind: int
     start_m: float
@@ -44,7 +44,7 @@ class SideStretch:
 
 @dataclass(frozen=True)
 class CellSide:
-    """One straight side of a room on a line's face; `inward` is the sign of the way into the room on the other axis."""
+    """One straight side of a room; `inward` is the sign of the direction into the room on the other axis."""
 
     room: int
     line: int
@@ -63,7 +63,7 @@ class CellSide:
 
 @dataclass(frozen=True, eq=False)
 class FloorWalls:
-    """A floor's walls, its rooms' sides and polygons (N, 2), the outer faces' outline, and the well's polygon."""
+    """The walls of a floor, sides and polygons (N, 2) of its rooms, the outline, and the polygon of the stair well."""
 
     lines: tuple[WallLine, ...]
     sides: tuple[CellSide, ...]
@@ -118,7 +118,7 @@ class _LabelGrid:
 def trace_walls(
     cells: list[RoomCell], well: Rectangle | None, head: tuple[float, float] | None, outer_m: float, inner_m: float
 ) -> FloorWalls:
-    """The walls and sides of a floor whose first cell is the hall; `well` is a stair hole within it, open at `head`."""
+    """Walls and sides of a floor whose first cell is the hall; `well` is a stair well in it, open at `head`."""
     field = _LabelGrid(cells, well, head)
     lines, owner = _wall_lines(field, outer_m, inner_m)
     polygons, sides = [], []
@@ -182,7 +182,7 @@ def _contour(field: _LabelGrid, labels: tuple[int, ...]) -> list[tuple[int, int]
 
 
 def _inset_contour(field: _LabelGrid, ring: list[tuple[int, int]], insets_m: list[float]) -> F64:
-    """The ring's corners (N, 2) in metres, each side moved inwards (to its left) by its inset."""
+    """The corners (N, 2) of a contour in metres, each side moved inward (to its left) by its inset."""
     moved = []
     for (ai, aj), (bi, bj), inset in zip(ring, ring[1:] + ring[:1], insets_m, strict=True):
         if aj == bj:

@@ -1,4 +1,7 @@
-"""A room while it is furnished: what stands where, and where one more group fits so that the room stays walkable."""
+"""Occupancy of a room while it is furnished, and the search for a pose where one more group fits.
+
+The room stays walkable: all doors remain connected.
+"""
 
 from __future__ import annotations
 
@@ -25,15 +28,15 @@ from placegraph.tools.simulator.room_sides import RoomSide, room_sides
 
 CELL_M, RADIUS_M = 0.05, 0.25
 FREE_BEFORE_DOOR_M, FREE_AT_STAIRS_M, FREE_AT_WINDOW_M = 0.9, 1.0, 0.5
-SILL_M = 0.95  # what is no higher may stand before a window, even where its sill is lower
-GROUP_GAPS_M = (0.6, 0.45)  # between groups: the wide one wherever it fits
-TRIALS = 10  # places that are tried for a walkable room before a group is given up
+SILL_M = 0.95  # furniture up to this height may stand in front of a window
+GROUP_GAPS_M = (0.6, 0.45)  # between groups; the wide gap is tried first
+TRIALS = 10  # poses tried before a group is given up
 QUARTERS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]], float)
 
 
 @dataclass(frozen=True)
 class GroupPose:
-    """Where a group's frame lies in the world: metres, and quarter turns about z."""
+    """Pose of a group in the world: metres, and quarter turns about z."""
 
     x: float
     y: float
@@ -41,23 +44,23 @@ class GroupPose:
 
 
 def box_around(placed: PlacedItem) -> F64:
-    """(2, 3) box around an item's footprint and height: a turned round thing's footprint is wider than the thing."""
+    """(2, 3) box of an item's footprint and height; for a turned round item it is wider than the item."""
     box, corners = placed.box, placed.footprint
     box[:, :2] = corners.min(axis=0), corners.max(axis=0)
     return box
 
 
 class RoomPlanner:
-    """One room, with everything that has found its place in it."""
+    """One room with everything that has been placed in it."""
 
     def __init__(self, house: House, room: Room, origin: F64, walkable: Bool) -> None:
         self.room, self.floor = room, house.floors[room.floor]
         self.sides: tuple[RoomSide, ...] = room_sides(room, self.floor)
         self.items: list[PlacedItem] = []  # of this room, doors and stairs too
-        self.boxes: list[F64] = []  # (2, 3) each, world frame: what wall things must keep clear of
+        self.boxes: list[F64] = []  # (2, 3) each, world frame; wall items keep clear of them
         self.taken: list[F64] = []  # (4,) rectangles of what stands on the floor
         self.keepouts: list[F64] = []  # (4,) before doors and stairs
-        self.accesses: list[F64] = []  # (2,) points that people come in by
+        self.accesses: list[F64] = []  # (2,) points inside the doors and at the stairs
         self.windows: list[tuple[F64, float]] = []  # (4,) rectangle before it, highest thing allowed there
         self.origin, self.walkable = self._crop_to_room(origin, walkable)
         self._add_openings()
@@ -67,7 +70,7 @@ class RoomPlanner:
         self._measure_free_space()
 
     def _crop_to_room(self, origin: F64, walkable: Bool) -> tuple[F64, Bool]:
-        """The part of the floor's grid around this room, only its own cells and those just beyond its doors."""
+        """The part of the floor's grid around this room: its own cells and those just beyond its doors."""
         low = np.floor((self.room.polygon.min(axis=0) - 0.8 - origin) / CELL_M).astype(int).clip(0)
         high = np.ceil((self.room.polygon.max(axis=0) + 0.8 - origin) / CELL_M).astype(int)
         part = walkable[low[1] : high[1], low[0] : high[0]]
@@ -109,7 +112,7 @@ class RoomPlanner:
         near = np.concatenate((self.room.polygon.min(axis=0) - 0.3, self.room.polygon.max(axis=0) + 0.3))
         if not rectangles_overlap(np.concatenate((box[0, :2], box[1, :2])), near).any():
             return
-        if placed.item.name == "window":  # a part of the wall: `sides` knows of it
+        if placed.item.name == "window":  # part of the wall, see room_sides
             return
         self.boxes.append(box)
         if blocks_robot(placed, self.floor):
@@ -117,7 +120,7 @@ class RoomPlanner:
             self._block(self.walkable, placed.footprint)
 
     def _measure_free_space(self) -> None:
-        """Note what is free before there is any furniture: the yardstick for what furniture may take away."""
+        """Records the free space before furnishing, the reference for what furniture may take away."""
         blocked = np.pad(~self.walkable, ((1, 0), (1, 0))).astype(np.int64)
         self._blocked_sum = blocked.cumsum(axis=0).cumsum(axis=1)
         free = erode_by_radius(self.walkable, CELL_M, RADIUS_M)
@@ -141,7 +144,7 @@ class RoomPlanner:
     def find_pose(
         self, layout: GroupLayout, near: F64 | None = None, gaps_m: Sequence[float] = GROUP_GAPS_M
     ) -> GroupPose | None:
-        """A place for a group, preferably near a wanted point (2,) or else in a corner; None when there is none."""
+        """A pose for a group, preferably near a point (2,) or else in a corner; None when there is none."""
         for gap_m in gaps_m:
             candidates: list[tuple[float, GroupPose]] = []
             for quarter, places, cost in self._candidate_places(layout, near):
@@ -162,7 +165,7 @@ class RoomPlanner:
         return None
 
     def _candidate_places(self, layout: GroupLayout, near: F64 | None) -> list[tuple[int, F64, F64]]:
-        """Places to try: quarter turns, points (N, 2), costs (N,)."""
+        """Candidate places: quarter turns, points (N, 2), costs (N,)."""
         standing = np.stack([piece.footprint_rectangle for piece in layout.pieces if piece.on == ON_FLOOR])
         left, right = standing[:, 0].min(), standing[:, 2].max()
         result = []
@@ -189,7 +192,7 @@ class RoomPlanner:
         return noisy
 
     def _fits(self, layout: GroupLayout, quarter: int, places: F64, gap_m: float) -> Bool:
-        """(N,) whether a group fits at places (N, 2), by its rectangles."""
+        """(N,) whether the rectangles of a group fit at places (N, 2)."""
         pieces = [piece for piece in layout.pieces if piece.on in (ON_FLOOR, ON_WALL)]
         local = np.stack([piece.footprint_rectangle for piece in pieces])
         corners = local.reshape(-1, 2, 2) @ QUARTERS[quarter].T
@@ -203,7 +206,7 @@ class RoomPlanner:
             good &= ~rectangles_overlap(boxes[:, :, None], np.stack(self.keepouts)).any(axis=(1, 2))
         tops = np.array(
             [0.9 if p.item.name == "sink" else p.z + p.item.extent[1, 2] for p in pieces]
-        )  # a tap hides no view
+        )  # a tap may stand in front of a window
         for zone, highest_m in self.windows:
             good &= ~rectangles_overlap(boxes[:, tops > highest_m + 0.01], zone).any(axis=1)
         standing = np.array([piece.on == ON_FLOOR for piece in pieces])
@@ -213,7 +216,7 @@ class RoomPlanner:
         return good
 
     def is_unbuilt(self, boxes: F64) -> Bool:
-        """(...) whether no pilaster, parapet or stairs is within rectangles (..., 4)."""
+        """(...) whether rectangles (..., 4) are free of pilasters, parapets and stairs."""
         low = np.ceil((boxes[..., :2] + 0.03 - self.origin) / CELL_M - 0.5).astype(int)
         high = np.floor((boxes[..., 2:] - 0.03 - self.origin) / CELL_M + 0.5).astype(int)
         limit = np.array(self._blocked_sum.shape)[::-1] - 1
@@ -224,7 +227,7 @@ class RoomPlanner:
         return np.asarray(total[y1, x1] - total[y0, x1] - total[y1, x0] + total[y0, x0] == 0)
 
     def stays_walkable(self, more: Sequence[PlacedItem]) -> bool:
-        """Whether with these items, too, every door leads to every other and to nearly all that is free."""
+        """Whether with these items, too, all doors are connected and nearly all free floor is reachable."""
         mask = self.walkable.copy()
         for placed in more:
             if placed.support in (ON_FLOOR, ON_WALL) and blocks_robot(placed, self.floor):
@@ -245,7 +248,7 @@ class RoomPlanner:
     def place_group(
         self, layout: GroupLayout, pose: GroupPose, first_id: int, location: int = NOWHERE
     ) -> list[PlacedItem]:
-        """A group's items at a place, with ids from `first_id`."""
+        """The items of a group at a pose, with ids from `first_id`."""
         turn, result = QUARTERS[pose.quarter], []
         for number, piece in enumerate(layout.pieces):
             x, y = (turn @ (piece.x, piece.y) + (pose.x, pose.y)).tolist()
@@ -256,20 +259,20 @@ class RoomPlanner:
         return result
 
     def is_kept_free(self, placed: PlacedItem) -> bool:
-        """Whether an item is where nothing may stand: before a door or at the stairs."""
+        """Whether an item is where nothing may stand: in front of a door or at the stairs."""
         box = box_around(placed)
         footprint_rectangle = np.concatenate((box[0, :2], box[1, :2]))
         return any(bool(rectangles_overlap(footprint_rectangle, keepout)) for keepout in self.keepouts)
 
     def is_clear(self, placed: PlacedItem, gap_m: float) -> bool:
-        """Whether an item's box comes no nearer than a gap to any other box of the room."""
+        """Whether an item's box keeps a distance of `gap_m` to all other boxes of the room."""
         box = box_around(placed)
         return not any(
             (box[0] < other_box[1] + gap_m).all() and (other_box[0] < box[1] + gap_m).all() for other_box in self.boxes
         )
 
     def add(self, placed: Sequence[PlacedItem]) -> None:
-        """Note items that have found their place."""
+        """Records placed items."""
         for item in placed:
             box = box_around(item)
             self.items.append(item)

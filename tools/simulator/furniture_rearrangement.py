@@ -1,4 +1,4 @@
-"""The same house a while later: some pieces of furniture stand elsewhere in their rooms, with what stands on them."""
+"""The same house some time later: some pieces of furniture, with what is on them, stand elsewhere in their rooms."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from placegraph.tools.simulator.house_model import NOWHERE, ON_FLOOR, FurnitureL
 from placegraph.tools.simulator.occupancy_grid import expand_rectangle, points_in_polygon
 from placegraph.tools.simulator.room_furnishing import floor_outline
 
-SALT = 6_301  # keeps these choices apart from what else is drawn from the seed
+SALT = 6_301  # a random stream of its own
 TRIALS = 200  # places that are tried for one piece
-MIN_MOVE_M = 1.0  # further than most pieces are wide: the old place is left empty
+MIN_MOVE_M = 1.0  # more than the width of most pieces, so that the old place is empty
 GAP_M = 0.05  # to what stands beside it
-MAX_AREA_M2 = 1.0  # of a footprint: what a person or two would push or carry
+MAX_AREA_M2 = 1.0  # largest footprint, what two persons could move
 FIXED_CLASSES = frozenset({
     "door", "window", "stairs", "radiator", "kitchen counter", "stove", "refrigerator", "sink", "toilet", "bathtub",
     "shower", "washing machine", "rug", "fireplace", "dishwasher",
@@ -27,10 +27,10 @@ FIXED_CLASSES = frozenset({
 
 
 def rearrange(house: House, count: int, seed: int) -> House:
-    """The house after `count` pieces that stand on the floor were moved by a metre or more within their rooms.
+    """The house after `count` pieces on the floor were moved by 1 m or more within their rooms.
 
-    Ids stay; a moved piece leaves its location. Every room can still be reached.
-    Raises ConfigError when the house does not have so many pieces that can be moved.
+    Ids stay; a moved piece leaves its location. Every room can still be reached. Raises ConfigError when fewer pieces
+    can be moved.
     """
     random = np.random.default_rng([seed, SALT])
     order = random.permutation([item.id for item in house.items if _is_movable(item)]).tolist()
@@ -47,7 +47,7 @@ def rearrange(house: House, count: int, seed: int) -> House:
 
 
 def moved_item_ids(before: House, after: House) -> tuple[int, ...]:
-    """Ids of the items that stand elsewhere, those that were carried along among them."""
+    """Ids of the items whose pose changed, including those carried along."""
     pairs = zip(before.items, after.items, strict=True)
     return tuple(a.id for a, b in pairs if (a.x, a.y, a.z, a.yaw) != (b.x, b.y, b.z, b.yaw))
 
@@ -98,7 +98,7 @@ def _fits(piece: PlacedItem, polygon: F64, standing: Sequence[PlacedItem]) -> bo
 
 
 def _carried_ids(items: Sequence[PlacedItem], number: int) -> Iterator[int]:
-    """The piece and all that stands on it, directly or not."""
+    """The piece and everything on it, directly or indirectly."""
     yield number
     for item in items:
         if item.support == number:
@@ -106,7 +106,7 @@ def _carried_ids(items: Sequence[PlacedItem], number: int) -> Iterator[int]:
 
 
 def _moved_along(carried: PlacedItem, before: PlacedItem, after: PlacedItem) -> PlacedItem:
-    """An item that moves with a piece from where that stood to where it stands."""
+    """An item that moves with a piece."""
     pose = after.world_from_item @ np.linalg.inv(before.world_from_item) @ carried.world_from_item
     x, y, z = pose[:3, 3].tolist()
     return replace(carried, x=x, y=y, z=z, yaw=carried.yaw + after.yaw - before.yaw, location=NOWHERE)
@@ -118,7 +118,7 @@ def _with_items(house: House, moved: dict[int, PlacedItem]) -> House:
 
 
 def _without_moved(place: FurnitureLocation, items: Sequence[PlacedItem]) -> FurnitureLocation:
-    """A location less what is no longer there."""
+    """A location without the members that were moved away."""
     members = tuple(item_id for item_id in place.members if items[item_id].location == place.id)
     standing = [items[item_id] for item_id in members if items[item_id].support == ON_FLOOR]
     if members == place.members or not standing:

@@ -1,6 +1,6 @@
-"""What is true of a house and of the frames exported from it, as the JSON files of a folder's truth/.
+"""Ground truth of a house and of the frames exported from it, as the JSON files of a folder's truth/.
 
-Metres and radians, rounded to 1 mm and 1 mrad; world frame. Each file is checked in full when it is read.
+Metres and radians, rounded to 1 mm and 1 mrad; world frame. Every file is validated when it is read.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from placegraph.tools.simulator.house_model import House, Item, PlacedItem
 from placegraph.tools.simulator.room_connections import room_connections
 
 TRUTH = "truth"  # the folder beside rgb/ and depth/
-BEFORE = "before.json"  # where what was moved stood before
+BEFORE = "before.json"  # the former poses of moved items
 QUESTIONS = "questions.json"  # read and written by questions.py
 CLEAR_SHARE = 400 / (640 * 480)  # of the image: 20 x 20 px of 640 x 480
 _STRICT = ConfigDict(strict=True, extra="forbid")
@@ -52,7 +52,7 @@ Polygon = Annotated[F64, _shape(-1, 2), _AS_LISTS]
 
 @dataclass(frozen=True)
 class HouseRun:
-    """What was asked for, and what made it: equal values mean equal folders."""
+    """The order for a house and the generator version; equal values mean equal folders."""
 
     __pydantic_config__ = _STRICT
     seed: int
@@ -60,15 +60,15 @@ class HouseRun:
     limit: int  # frames at most; 0: the whole walk
     width: int
     height: int
-    version: str  # build.generator_version()
-    frames: int  # so many there are
+    version: str  # house_frames.generator_version()
+    frames: int  # number of frames
     moved: int = 0  # pieces of furniture between the two walks; 0: there is one walk
-    frames_before: int = 0  # the move; all of them when nothing was moved
+    frames_before: int = 0  # frames before the move; all of them when nothing was moved
 
 
 @dataclass(frozen=True, eq=False)
 class OrientedBox:
-    """A box turned by `yaw` about z: centre (3,) and size (3,) along its own axes."""
+    """A box turned by `yaw` about z: centre (3,) and size (3,) along its own axes, metres."""
 
     __pydantic_config__ = _STRICT
     center: Point
@@ -78,7 +78,7 @@ class OrientedBox:
 
 @dataclass(frozen=True, eq=False)
 class TrueObject:
-    """One object; room, support and location as in model.PlacedItem, `class_name` is a name of classes.py."""
+    """One object; room, support and location as in PlacedItem, `class_name` is one of object_classes.NAMES."""
 
     __pydantic_config__ = _STRICT
     id: int
@@ -142,7 +142,7 @@ class TrueConnection:
 
 @dataclass(frozen=True)
 class FrameCounts:
-    """In how many frames an object is in the picture, and in how many clearly: with `CLEAR_SHARE` of it or more."""
+    """The number of frames that show an object, and that show it clearly: on `CLEAR_SHARE` of the image or more."""
 
     __pydantic_config__ = _STRICT
     id: int  # of the object
@@ -152,15 +152,15 @@ class FrameCounts:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """All of it; each field is the file of that name in truth/."""
+    """The whole ground truth; each field is the file of that name in truth/."""
 
     house: HouseRun
     objects: tuple[TrueObject, ...]  # by id
     rooms: tuple[TrueRoom, ...]
     floors: tuple[TrueFloor, ...]
     locations: tuple[TrueLocation, ...]
-    seen: tuple[FrameCounts, ...]  # one for each object, by id; of what was moved, at its last place
-    connections: tuple[TrueConnection, ...] | None = None  # None: the folder says nothing of them
+    seen: tuple[FrameCounts, ...]  # one per object, by id; of moved objects at their last pose
+    connections: tuple[TrueConnection, ...] | None = None  # None: the folder has no such file
 
 
 _FILES: dict[str, TypeAdapter[Any]] = {
@@ -220,7 +220,7 @@ def _true_object(placed: PlacedItem, floor: int) -> TrueObject:
 
 
 def write_truth(truth: Truth, folder: Path) -> None:
-    """Write truth/*.json into a folder: sorted keys, rounded, so that equal truths are equal bytes."""
+    """Writes truth/*.json with sorted keys and rounded numbers, so that equal truths are equal bytes."""
     (folder / TRUTH).mkdir(exist_ok=True)
     for name, adapter in _FILES.items():
         if getattr(truth, name) is None:
@@ -231,9 +231,9 @@ def write_truth(truth: Truth, folder: Path) -> None:
 
 
 def read_truth(dir: Path) -> Truth:
-    """Read what write_truth wrote; raises SourceError naming the file and the field that is missing or damaged."""
+    """Reads what write_truth wrote; raises SourceError naming the file and the missing or damaged field."""
     files = {field.name: dir / TRUTH / f"{field.name}.json" for field in fields(Truth)}
-    # houses made before connections were truth, and truths that others bring, may lack them
+    # older or foreign folders may lack connections
     existing = {name: file for name, file in files.items() if name != "connections" or file.exists()}
     truth = Truth(**{name: _read(file, name) for name, file in existing.items()})
     ids = [true_object.id for true_object in truth.objects]
@@ -252,14 +252,14 @@ def write_before(before: House, ids: tuple[int, ...], folder: Path) -> None:
 
 
 def read_before(dir: Path) -> tuple[TrueObject, ...]:
-    """What was moved, as it stood before; () where nothing was. Raises SourceError when it is damaged."""
+    """The moved objects as they stood before; () when nothing was moved. Raises SourceError when damaged."""
     file = dir / TRUTH / BEFORE
     objects: tuple[TrueObject, ...] = _read(file, "objects") if file.exists() else ()
     return objects
 
 
 def read_house_run(dir: Path) -> HouseRun | None:
-    """What made a house folder; None when the folder has no truth/house.json. Raises SourceError when it is damaged."""
+    """The run of a house folder; None when it has no truth/house.json. Raises SourceError when damaged."""
     file = dir / TRUTH / "house.json"
     run: HouseRun | None = _read(file, "house") if file.exists() else None
     return run

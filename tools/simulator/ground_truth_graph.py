@@ -1,4 +1,4 @@
-"""The scene graph that a perfect map of a house would hold: each item with its class, box, colour and place."""
+"""The scene graph of a perfect map of a house: each item with its class, box, colour and parent."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from placegraph.tools.simulator.house_model import NOWHERE, House, PlacedItem
 def ground_truth_graph(house: House) -> SceneGraph:
     """The graph of a furnished house. Objects are O<item id>, rooms R<room id>, locations L<id>, floors F<index>.
 
-    A colour is that of the word which a person would use for the item; items without one have none.
+    The colour of an object is that of its colour word; items without one have none.
     """
     nodes = [_place("F", floor.index, "B0", f"floor {floor.index + 1}", floor.outline, floor.z_m, floor.height_m)
              for floor in house.floors]  # fmt: skip

@@ -1,4 +1,4 @@
-"""A whole house from its seed, and the frames that a camera sees on a walk through it."""
+"""A complete house from its seed, and the frames of a camera on a trajectory through it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from placegraph.tools.simulator.furniture_rearrangement import rearrange
 from placegraph.tools.simulator.house_model import House
 from placegraph.tools.simulator.room_furnishing import furnish
 
-SENSOR_SALT = 7_001  # keeps the sensor's noise apart from what else is drawn from the seed
+SENSOR_SALT = 7_001  # a random stream of its own
 DEPTH_STEPS_PER_M = 5000  # the depth factor of TUM RGB-D folders; 16 bit reach to 13.1 m
 
 
 class HouseFrame(NamedTuple):
-    """One frame with its truth; depth is a whole number of steps of 1 / DEPTH_STEPS_PER_M metres, 0 = no reading."""
+    """One frame with its ground truth; depth is in whole steps of 1 / DEPTH_STEPS_PER_M metres, 0 = no reading."""
 
     frame_id: int
     stamp_ns: int
@@ -35,29 +35,29 @@ class HouseFrame(NamedTuple):
 
     @property
     def depth_steps(self) -> U16:
-        """(H, W) depth as the integers that a sensor gives."""
+        """(H, W) depth in integer steps, as a sensor gives it."""
         return np.round(self.depth_m * DEPTH_STEPS_PER_M).astype(np.uint16)
 
 
 def generate_house(seed: int, floors: int | None = None) -> House:
-    """The furnished house of a seed, of so many floors (None: the seed chooses)."""
+    """The furnished house of a seed with `floors` floors (None: the seed chooses)."""
     return furnish(generate_floor_plan(seed, floors), seed)
 
 
 def make_renderer(house: House, width: int, height: int) -> Any:
-    """A render.Renderer; raises ConfigError that names the extra when the ray casting library is not installed.
+    """A render.Renderer. Raises ConfigError naming the extra when the ray casting library is missing.
 
-    Loaded when it is asked for: the library is an extra, and truth can be read and scored without it.
+    Imported lazily: the library is an extra, and ground truth can be read and scored without it.
     """
     return plugin("placegraph.tools.simulator", "render", "Renderer", "renderer")(house, width, height)
 
 
 class HouseFrames:
-    """The frames of one house along its walk; each is made by itself, so any may be made first, in any process.
+    """The frames of one house along its trajectory. Frames are independent: any may be rendered first, in any process.
 
-    moved: so many pieces of furniture are moved after the walk, and the house is walked again, backwards: the second
-    film begins on the floor where the first ended. `before` is the house of the first `frames_before` frames, `house`
-    that of the others.
+    moved: this many pieces of furniture are moved after the first trajectory, and the house is filmed again backwards
+    from the floor where the first film ended. `before` is the house of the first `frames_before` frames, `house` of the
+    others.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class HouseFrames:
         self.intrinsics: F64 = np.asarray(self._renderer.intrinsics, np.float64)  # (4,) fx fy cx cy in px
 
     def count(self, limit: int = 0) -> int:
-        """How many frames there are, at most `limit` (0: all)."""
+        """The number of frames, at most `limit` (0: all)."""
         return min(limit or len(self.stamps_ns), len(self.stamps_ns))
 
     def frames(self, limit: int = 0) -> Iterator[HouseFrame]:
@@ -84,17 +84,17 @@ class HouseFrames:
         return (self.frame(index) for index in range(self.count(limit)))
 
     def frame(self, index: int) -> HouseFrame:
-        """The frame of that index."""
+        """The frame of an index."""
         pose = np.asarray(self.world_from_camera[index], np.float64)
         view = (self._renderer_before if index < self.frames_before else self._renderer).render(pose)
-        # a generator of its own for each frame: no frame depends on those made before it
+        # one generator per frame, so that frames are independent
         random = np.random.default_rng([self.house.seed, SENSOR_SALT, index])
         color, depth_m = simulate_camera(view, self.intrinsics, random, self._sensor_settings)
         return HouseFrame(index, int(self.stamps_ns[index]), color, quantize_depth(depth_m), view.instance, pose)
 
 
 def _then_reversed(first: CameraTrajectory, second: CameraTrajectory) -> CameraTrajectory:
-    """The first walk, then the second one backwards, a frame's time later."""
+    """The first trajectory, then the second one backwards, one frame later."""
     step_ns = int(first.stamps_ns[1] - first.stamps_ns[0])
     back_ns = first.stamps_ns[-1] + step_ns + (second.stamps_ns[-1] - second.stamps_ns[::-1])
     poses = np.concatenate((first.world_from_camera, second.world_from_camera[::-1]))
@@ -102,15 +102,15 @@ def _then_reversed(first: CameraTrajectory, second: CameraTrajectory) -> CameraT
 
 
 def quantize_depth(depth_m: F32) -> F32:
-    """(H, W) depth in metres, rounded to the steps of 16 bit; what does not fit or is not finite is no reading."""
+    """(H, W) depth in metres rounded to 16 bit steps; values that do not fit or are not finite become 0."""
     steps = np.round(np.asarray(depth_m, np.float64) * DEPTH_STEPS_PER_M)
     fits = np.isfinite(steps) & (steps > 0) & (steps <= np.iinfo(np.uint16).max)
     return (np.where(fits, steps, 0) / DEPTH_STEPS_PER_M).astype(np.float32)
 
 
-@cache  # of the sources as they were when this process began
+@cache  # cached: the sources as they were at the first call
 def generator_version() -> str:
-    """A checksum of the generator's own sources: equal seeds give equal bytes while it stays the same."""
+    """A checksum of the simulator's sources: equal seeds give equal bytes while it is unchanged."""
     folder, digest = Path(__file__).parent, hashlib.sha256()
     for file in sorted(folder.rglob("*.py"), key=lambda file: file.relative_to(folder).as_posix()):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")

@@ -1,4 +1,4 @@
-"""All triangles of a house in one list, with what a renderer needs to know at their corners."""
+"""All triangles of a house in one list with the vertex attributes that the renderer needs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ _SMOOTH = 0.8  # faces whose normals differ less (cosine) look like one curved s
 
 @dataclass(frozen=True, eq=False)
 class HouseMesh:
-    """All triangles of a house: corners (T, 3, 8) float64 as xyz world, uv, smooth normal; and what each is made of."""
+    """The triangles of a house and their attributes.
+
+    corners (T, 3, 8) float64 as xyz world, uv, smooth normal; material, instance and texel density of each triangle.
+    """
 
     corners: F64
     material: I64
@@ -26,7 +29,7 @@ class HouseMesh:
 
 
 def house_mesh(house: House) -> tuple[list[Material], HouseMesh]:
-    """Every part of the house in the world frame, cut to short edges, and the different materials."""
+    """The different materials, and every part of the house in the world frame with long edges split."""
     owners: list[tuple[Part, F64, int]] = [(part, np.eye(4), 0) for part in house.structure]
     owners += [(part, placed.world_from_item, placed.id + 1) for placed in house.items for part in placed.item.parts]
     owners = [owner for owner in owners if len(owner[0].faces)]
@@ -49,10 +52,10 @@ def house_mesh(house: House) -> tuple[list[Material], HouseMesh]:
 
 
 def box_uv_mapping(corners: F64, material: Material) -> tuple[F64, F64]:
-    """Texture coordinates (F, 3, 2) in repeats of one part's corners (F, 3, 3), and its texels per metre (F,).
+    """Texture coordinates (F, 3, 2) in repeats of a part's corners (F, 3, 3), and its texels per metre (F,).
 
-    Each face is mapped along the axis its normal is nearest to, upright and unmirrored seen from outside; the grain of
-    wood runs along the longer side of the part.
+    Each face is projected along the axis nearest to its normal, upright and unmirrored from outside; the grain of wood
+    runs along the longer side of the part.
     """
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     axis = np.argmax(np.abs(normal) + np.array([2e-9, 1e-9, 0]), axis=1)
@@ -75,7 +78,7 @@ def box_uv_mapping(corners: F64, material: Material) -> tuple[F64, F64]:
 
 
 def _smooth_normals(part: Part) -> F64:
-    """(F, 3, 3) unit normals at the corners: the mean of the faces around, edges sharper than _SMOOTH stay sharp."""
+    """(F, 3, 3) unit corner normals: the mean over adjacent faces; edges sharper than _SMOOTH stay sharp."""
     corners = part.vertices[part.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
@@ -95,9 +98,9 @@ def _smooth_normals(part: Part) -> F64:
 
 
 def _split_long_edges(corners: F64) -> tuple[F64, I64]:
-    """Triangles (T, 3, K) halved at their longest edge until none exceeds _EDGE_M, and the index each came from.
+    """Triangles (T, 3, K) split at their longest edge until none exceeds _EDGE_M, and their source indices.
 
-    An edge is always halved at its middle, from both sides: neighbours still meet without cracks.
+    An edge is split at its middle in both adjacent triangles, so that no cracks appear.
     """
     source = np.arange(len(corners))
     done, origin = [], []

@@ -1,8 +1,8 @@
-"""What a house is made of: plain values that the plan, the furniture, the renderer and the truth share.
+"""The data model of a house, shared by floor plan, furniture, renderer and ground truth.
 
-World frame: metres, z up, the lowest floor's surface at z = 0. Item frame: origin in the middle of the footprint at the
-item's lowest point, x to its right, y to its back (the front of a sofa, the screen of a tv, looks to -y), z up.
-Everything is frozen; randomness comes only from generators that are passed in.
+World frame: metres, z up, the surface of the lowest floor at z = 0. Item frame: origin in the middle of the footprint
+at the lowest point, x right, y to the back (the front of a sofa faces -y), z up. All values are frozen; random
+generators are passed in.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Part:
 
 @dataclass(frozen=True)
 class SupportSurface:
-    """A level rectangle of an item on which small things may stand, in the item's frame, with the room above it."""
+    """A level rectangle of an item on which small items may stand, item frame, with the free height above it."""
 
     x0: float
     y0: float
@@ -60,7 +60,7 @@ class SupportSurface:
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """One designed object, in its own frame."""
+    """One designed object in its own frame."""
 
     name: str  # a class of classes.py
     parts: tuple[Part, ...]
@@ -76,7 +76,7 @@ class Item:
 
 @dataclass(frozen=True, eq=False)
 class PlacedItem:
-    """An item at its place: turned by `yaw` about z, then moved to (x, y, z), in the world frame."""
+    """An item in the world: turned by `yaw` about z, then moved to (x, y, z)."""
 
     id: int  # counted from 0 in the house; the instance image holds id + 1
     item: Item
@@ -150,7 +150,7 @@ class Room:
 
 @dataclass(frozen=True, eq=False)
 class Staircase:
-    """A straight flight from `floor` to the floor above: foot and head (3,), the middle of its first and last edge."""
+    """A straight flight from `floor` to the floor above: foot and head (3,), the middles of its first and last edge."""
 
     floor: int
     foot: F64  # on the lower floor, metres, world frame
@@ -173,7 +173,7 @@ class Floor:
 
 @dataclass(frozen=True, eq=False)
 class FurnitureLocation:
-    """A group of furniture used together: its kind, room, members (item ids) and outline (K, 2), world frame."""
+    """Furniture used together: kind, room, members (item ids) and outline (K, 2), world frame."""
 
     id: int
     kind: str  # sleeping area, dining area, ...

@@ -1,6 +1,6 @@
-"""How much light reaches the triangles of a house: shadow rays to the lamps, and rays around for nooks and contact.
+"""Light baked into the triangles of a house: shadow rays to the lamps, and ambient occlusion.
 
-It is worked out once per house at the triangles' corners and is linear in between.
+Computed once per house at the corners of the triangles and linear in between.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from embreex.rtcore_scene import EmbreeScene
 from placegraph.runtime.arrays import F64, I64
 from placegraph.tools.simulator.house_model import House
 
-_LAMPS = 3  # lamps of its floor that light a triangle
-_AMBIENT_RAYS = 12  # rays around a corner that tell how enclosed it is
-_CLOSE_M = 0.45  # an obstacle this close takes away 63 % of its share of the ambient light
-_COVER_M = 0.08  # a rug or picture this thin throws no shadow on what it covers, which would show around it
+_LAMPS = 3  # lamps per triangle
+_AMBIENT_RAYS = 12  # ambient occlusion rays per corner
+_CLOSE_M = 0.45  # an obstacle at this distance occludes 63 %
+_COVER_M = 0.08  # thinner items (rugs, pictures) cast no shadow on their support
 
 
 def nearest_lamps(house: House, points: F64) -> F64:
-    """(T, _LAMPS, 3) the nearest lamps on the same floor as each point; far above where there are fewer."""
+    """(T, _LAMPS, 3) the nearest lamps on the floor of each point; far above where there are fewer."""
     lamps = np.array([*house.lights, *[(0.0, 0.0, 1e4 + k) for k in range(_LAMPS)]], float)
     levels = np.array(sorted(floor.z_m for floor in house.floors))
     level, lamp_level = (np.searchsorted(levels, z - 0.02, side="right") for z in (points[:, 2] + 0.04, lamps[:, 2]))
@@ -34,7 +34,7 @@ def nearest_lamps(house: House, points: F64) -> F64:
 def bake_light(house: House, scene: EmbreeScene, corners: F64) -> F64:
     """(T, 3) light at the corners (T, 3, 8) of a mesh, about 0.3 in a nook to 1.2 under a lamp.
 
-    Corners that meet at one point with one normal share their light: smooth, and a quarter of the rays.
+    Corners at one point with one normal share their light, which is smooth and saves three quarters of the rays.
     """
     world, normals = corners[..., :3], corners[..., 5:8]
     inward = world.mean(axis=1, keepdims=True) - world
@@ -49,8 +49,8 @@ def bake_light(house: House, scene: EmbreeScene, corners: F64) -> F64:
 
 
 def _ambient_light(scene: EmbreeScene, point: F64, normal: F64) -> F64:
-    """(N,) ambient light, less in nooks and near contact; it comes more from above."""
-    # the same directions at every corner: random ones would show as blotches on a plain wall
+    """(N,) ambient light, less in nooks and near contact; more of it comes from above."""
+    # the same directions everywhere: random ones cause blotches on plain walls
     height = 1 - (2 * np.arange(_AMBIENT_RAYS) + 1) / _AMBIENT_RAYS
     turn, ring = np.arange(_AMBIENT_RAYS) * np.pi * (3 - np.sqrt(5)), np.sqrt(1 - height**2)
     total = np.zeros(len(point))
@@ -62,20 +62,20 @@ def _ambient_light(scene: EmbreeScene, point: F64, normal: F64) -> F64:
 
 
 def _lamp_light(scene: EmbreeScene, point: F64, normal: F64, lamps: F64) -> F64:
-    """(N,) light that comes straight from the lamps (N, _LAMPS, 3)."""
+    """(N,) direct light of the lamps (N, _LAMPS, 3)."""
     total = np.zeros(len(point))
     for k in range(_LAMPS):
         way = lamps[:, k] - point
         apart_m = np.linalg.norm(way, axis=1)
         facing = np.einsum("ij,ij->i", way, normal) / np.maximum(apart_m, 1e-6)
         open_m = np.maximum(apart_m - 0.4, 0.01)  # the lampshade around the lamp throws no shadow
-        seen = _ray_lengths_m(scene, point, way, open_m) > 0.999 * open_m  # Embree counts in float32
+        seen = _ray_lengths_m(scene, point, way, open_m) > 0.999 * open_m  # Embree computes in float32
         total += seen * np.clip(0.15 + 0.85 * facing, 0, 1) * 1.2 / np.maximum(apart_m, 0.9)
     return total
 
 
 def _ray_lengths_m(scene: EmbreeScene, point: F64, way: F64, limit_m: F64 | float) -> F64:
-    """(N,) how far a ray from each point gets, at most `limit_m`."""
+    """(N,) free length of a ray from each point, at most `limit_m`."""
     unit = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
     limit = np.broadcast_to(limit_m, len(point)).astype(np.float32)
     ends = scene.run(point.astype(np.float32), unit.astype(np.float32), dists=limit, query="DISTANCE")
@@ -83,7 +83,7 @@ def _ray_lengths_m(scene: EmbreeScene, point: F64, way: F64, limit_m: F64 | floa
 
 
 def _corner_groups(world: F64, normal: F64) -> tuple[I64, I64]:
-    """Which corners meet at one point with one normal: (3 T,) group of each, and how many each group has."""
+    """Corners at one point with one normal: (3 T,) group of each corner, and the size of each group."""
     place = np.round((world - world.min(axis=(0, 1))) * 500).astype(np.int64)  # steps of 2 mm, 17 bits of them
     facing = np.round(normal * 3 + 3).astype(np.int64)
     key = ((place[..., 0] << 34) + (place[..., 1] << 17) + place[..., 2]) * 512

@@ -1,6 +1,6 @@
-"""Triangle meshes of simple solids, the bricks that furniture is assembled from.
+"""Triangle meshes of simple solids from which furniture is assembled.
 
-All functions give a Part in metres with outward faces; angles are radians. `moved` and `turned` place a Part.
+All functions return a Part in metres with outward faces; angles are radians. `moved` and `turned` place a Part.
 """
 
 from __future__ import annotations

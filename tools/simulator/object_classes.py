@@ -1,7 +1,7 @@
-"""The classes of the house and the words for them: those of training, and synonyms that only evaluation says.
+"""Object classes of the simulator and the words for them.
 
-The first word of `said` is the class's name. `unsaid` words never occur in training: through the text encoder alone
-must the detector understand them.
+The first of `training_words` is the name of the class. `held_out_words` never occur in training; evaluation uses them
+to test whether the detector generalises through the text encoder.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ObjectClass:
-    """One class: the words used in training and the words kept for evaluation."""
+    """One class with the words of training and the words kept for evaluation."""
 
     training_words: tuple[str, ...]
     held_out_words: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
-        """What the truth calls it."""
+        """The name in the ground truth."""
         return self.training_words[0]
 
 
@@ -93,7 +93,7 @@ CLASSES: tuple[ObjectClass, ...] = (
     ObjectClass(("piano", "pianoforte"), ("upright piano",)),
     ObjectClass(("bicycle", "bike"), ("mountain bike",)),
     ObjectClass(("radiator", "heater")),
-    # parts of the building that are asked for like objects
+    # parts of the building that questions ask for like objects
     ObjectClass(("door", "room door"), ("doorway",)),
     ObjectClass(("window", "glass window"), ("windowpane",)),
     ObjectClass(("stairs", "staircase"), ("stairway",)),

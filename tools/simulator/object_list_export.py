@@ -1,4 +1,4 @@
-"""A house as an object list (README, "Other data"): what is true of it, for questions without any image."""
+"""A house as an object list (docs, "Other data"), for questions without images."""
 
 from __future__ import annotations
 

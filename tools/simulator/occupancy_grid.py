@@ -1,6 +1,6 @@
-"""Where a robot can be on a floor: room floors and doorways, less walls, furniture and stair holes, on a grid.
+"""Where a robot can be on a floor, on a grid: room floors and doorways minus walls, furniture and stair wells.
 
-The middle of cell [row, column] lies at `origin + (column + 0.5, row + 0.5) * cell_m`, world frame.
+The centre of cell [row, column] is at `origin + (column + 0.5, row + 0.5) * cell_m`, world frame.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.simulator.house_model import Floor, House, PlacedItem, Wall, WallOpening
 
-LOW_M, HIGH_M = 0.03, 1.6  # above the floor: what lies lower is stepped over, what hangs higher is passed under
+LOW_M, HIGH_M = 0.03, 1.6  # above the floor; lower items are stepped over, higher ones passed under
 PASSAGE_KINDS = ("door", "archway")
 
 
 def free_grid(house: House, floor_index: int, cell_m: float = 0.05, radius_m: float = 0.25) -> tuple[F64, Bool]:
-    """Where the middle of a robot may be: origin (2,) in metres, world frame, and mask (rows along y, columns along x).
+    """Where the centre of a robot may be: origin (2,) in metres, world frame, and mask (rows along y, columns along x).
 
     Raises ConfigError when the house has no such floor.
     """
@@ -33,7 +33,7 @@ def free_grid(house: House, floor_index: int, cell_m: float = 0.05, radius_m: fl
 
 
 def unfurnished_grid(house: House, floor_index: int, cell_m: float) -> tuple[F64, Bool]:
-    """The floor without any items and without a robot's width: origin (2,) and mask of what may be stood on."""
+    """The walkable floor without items and without robot radius: origin (2,) and mask."""
     if not 0 <= floor_index < len(house.floors):
         raise ConfigError(f"house {house.seed} has no floor {floor_index}; it has {len(house.floors)}")
     floor = house.floors[floor_index]
@@ -66,7 +66,7 @@ def opening_rectangle(wall: Wall, opening: WallOpening, beyond_m: float = 0.0, i
 
 
 def blocks_robot(placed: PlacedItem, floor: Floor) -> bool:
-    """Whether an item is in the way of a robot on a floor: any of it between LOW_M and HIGH_M above the floor."""
+    """Whether any of an item is between LOW_M and HIGH_M above the floor."""
     low, high = placed.item.extent[:, 2] + placed.z - floor.z_m
     return bool(low < HIGH_M and high > LOW_M)
 
@@ -84,14 +84,14 @@ def cells_in_polygon(
 
 
 def expand_rectangle(footprint: F64, by_m: float) -> F64:
-    """A rectangle's corners (4, 2), counterclockwise, moved out on all sides: no thin leaf slips between cells."""
+    """A rectangle's corners (4, 2), counterclockwise, moved outward, so that a thin door leaf covers whole cells."""
     sides = np.roll(footprint, -1, axis=0) - footprint
     ways = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     return np.asarray(footprint + (np.roll(ways, 1, axis=0) - ways) * by_m)
 
 
 def points_in_polygon(polygon: F64, points: F64) -> Bool:
-    """Which of the points (..., 2) lie in a polygon (N, 2), by the parity of crossings."""
+    """Which of the points (..., 2) are in a polygon (N, 2), by the parity of crossings."""
     x, y = points[..., 0], points[..., 1]
     result = np.zeros(points.shape[:-1], bool)
     for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
@@ -101,14 +101,14 @@ def points_in_polygon(polygon: F64, points: F64) -> Bool:
 
 
 def erode_by_radius(walkable: Bool, cell_m: float, radius_m: float) -> Bool:
-    """Cells whose middle is at least `radius_m` from everything that may not be stood on."""
-    padded = np.pad(walkable, 1).astype(np.uint8)  # beyond the grid nothing may be stood on
+    """Cells whose centre is at least `radius_m` from everything that is not walkable."""
+    padded = np.pad(walkable, 1).astype(np.uint8)  # nothing outside the grid is walkable
     distance = cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1] * cell_m
     return np.asarray(distance >= radius_m + cell_m / 2)  # an obstacle begins half a cell before its cell's middle
 
 
 def _wall_cells(house: House, floor: Floor, origin: F64, shape: tuple[int, ...], cell_m: float) -> Bool:
-    """Cells that an upright face of the building crosses at a robot's height: pilasters and parapets, too."""
+    """Cells crossed by a vertical face of the building at the height of a robot, pilasters and parapets included."""
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(part.vertices[part.faces] for part in house.structure)])
     heights = triangles[..., 2] - floor.z_m
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -119,7 +119,7 @@ def _wall_cells(house: House, floor: Floor, origin: F64, shape: tuple[int, ...],
     if not len(sides):
         return crossed
     steps = int(np.ceil(np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1).max() / cell_m * 2)) + 1
-    for share in np.linspace(0, 1, steps):  # dense enough for the longest side that no cell of it is passed over
+    for share in np.linspace(0, 1, steps):  # dense enough to hit every cell of the longest side
         points = sides[:, 0] * (1 - share) + sides[:, 1] * share
         columns, rows = np.floor((points - origin) / cell_m).astype(int).T
         in_grid = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])

@@ -1,4 +1,4 @@
-"""Questions about a house, each with the one object that is right, checked on the true boxes alone."""
+"""Questions about a house, each with exactly one right object, computed from the true boxes alone."""
 
 from __future__ import annotations
 
@@ -27,31 +27,29 @@ from placegraph.tools.simulator.question_generation.relation_questions import (
 from placegraph.tools.simulator.question_generation.search_scopes import search_scopes
 from placegraph.tools.simulator.question_generation.viewpoint_questions import ordinal_questions, viewpoint_questions
 
-SALT = 8_009  # keeps the questions' randomness apart from what else is drawn from the seed
+SALT = 8_009  # a random stream of its own
 MAX_PER_TARGET = 3
-SMALL_TARGET_M = 0.15  # smaller ones are asked for where nothing better is left
+SMALL_TARGET_M = 0.15  # smaller targets are used only when others run out
 FIELDS = ("text", "target", "box", "form", "anchors", "room", "floor", "viewpoint", "program")
 
 
 @dataclass(frozen=True, eq=False)
 class HouseQuestion:
-    """A request and its one right answer: the target's id and box (2, 3) min and max in metres, world frame."""
+    """A question and its answer: the target's id and box (2, 3) min and max in metres, world frame."""
 
     text: str
     target: int
     box: F64
     form: str
-    anchors: tuple[int, ...]  # ids of the items that it is told by
+    anchors: tuple[int, ...]  # ids of the anchors
     room: int  # of the target
     floor: int
-    viewpoint: F64 | None = None  # (3,) the eyes of the asker, where the answer depends on them
-    program: str = (
-        ""  # what it means, in the words of nodes/grounding/program_syntax.py; "" in files from before there was one
-    )
+    viewpoint: F64 | None = None  # (3,) eyes of the asker, when the answer depends on them
+    program: str = ""  # its meaning in nodes/grounding/program_syntax.py; "" in older files
 
 
 def generate_questions(house: House, seed: int, count: int = 60) -> list[HouseQuestion]:
-    """Up to `count` questions about a furnished house, spread over forms, rooms and targets; fewer where it has fewer.
+    """Up to `count` questions about a furnished house, spread over forms, rooms and targets.
 
     Raises ConfigError when the count is negative or the house's items are not numbered from 0.
     """
@@ -75,7 +73,7 @@ def generate_questions(house: House, seed: int, count: int = 60) -> list[HouseQu
 
 
 def questions_by_form(table: ItemTable, random: np.random.Generator) -> dict[str, list[QuestionSpec]]:
-    """All requests about a house that have one right answer, by form, in random order."""
+    """All questions about a house that have one right answer, by form, in random order."""
     places = search_scopes(table)
     positions = asker_positions(table.house, random)
     answers = relations(table)
@@ -97,7 +95,7 @@ def questions_by_form(table: ItemTable, random: np.random.Generator) -> dict[str
 def _choose_varied(
     table: ItemTable, forms: dict[str, list[QuestionSpec]], count: int, random: np.random.Generator
 ) -> list[QuestionSpec]:
-    """Requests taken from the forms in turn, each time the one whose target, room and class were asked for least."""
+    """Questions from all forms in turn, each time the one whose target, room and class were used least."""
     targets: Counter[int] = Counter()
     rooms: Counter[int] = Counter()
     classes: Counter[str] = Counter()
@@ -143,13 +141,13 @@ def to_json(asked: Sequence[HouseQuestion]) -> list[dict[str, Any]]:
 
 
 def from_json(values: Sequence[dict[str, Any]]) -> list[HouseQuestion]:
-    """Questions read back from to_json's values; raises SourceError naming the first one that is damaged."""
+    """The questions of to_json's values; raises SourceError naming the first one that is damaged."""
     return [_read(value, k) for k, value in enumerate(values)]
 
 
 def _read(value: dict[str, Any], place: int) -> HouseQuestion:
     if isinstance(value, dict) and "program" not in value:
-        value = value | {"program": ""}  # a file from before questions had one
+        value = value | {"program": ""}  # older files have none
     if not isinstance(value, dict) or sorted(value) != sorted(FIELDS):
         raise SourceError(f"question {place}: expected the fields {', '.join(FIELDS)}")
     try:

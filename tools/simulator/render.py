@@ -1,7 +1,7 @@
-"""Pictures of a house: one ray per pixel into an Embree scene, with the light of the house baked into its triangles.
+"""Renders a house: one ray per pixel into an Embree scene, with baked light.
 
-Everything slow happens once per house (mesh.py, light.py). A frame then costs the rays, a dozen table lookups per pixel
-and one bilinear lookup in the texture atlas.
+Everything slow happens once per house (house_mesh.py, light_baking.py). A frame then costs the rays, a dozen table
+lookups per pixel and one bilinear lookup in the texture atlas.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from placegraph.tools.simulator.house_model import House, Material
 from placegraph.tools.simulator.light_baking import bake_light, nearest_lamps
 from placegraph.tools.simulator.texture_atlas import LEVEL_LEFT_PX, LEVEL_SIZES_PX, LEVELS, atlas
 
-_BAND_ROWS = 32  # so many rows at a time: the intermediate arrays stay in the processor's cache
+_BAND_ROWS = 32  # rows per band: intermediate arrays stay in the processor's cache
 
 
 class Renderer:
@@ -61,7 +61,7 @@ class Renderer:
         return view
 
     def _build_tables(self, mesh: HouseMesh, materials: list[Material]) -> None:
-        """What a pixel looks up by its triangle; the last row, found by index -1, is for rays that hit nothing."""
+        """Per-triangle tables; the last row, index -1, is for rays that hit nothing."""
         gloss = np.array([material.gloss for material in materials])[mesh.material]
         glow = np.array([material.glow for material in materials])[mesh.material]
         world, uv = mesh.corners[..., :3], mesh.corners[..., 3:5]
@@ -80,7 +80,7 @@ class Renderer:
         self._texels_per_px_m = np.append(blur, 0).astype(np.float32)
 
     def _bake_lighting(self, house: House, mesh: HouseMesh, materials: list[Material]) -> None:
-        """Bake the light at the corners and choose its colour, which varies with the house's seed."""
+        """Bakes the light at the corners and chooses its colour, which varies with the seed."""
         glow = np.array([material.glow for material in materials])[mesh.material][:, None]
         lamps = nearest_lamps(house, mesh.corners[..., :3].mean(axis=1))[:, 0]
         self._lamp = _columns(np.append(lamps, [[0, 0, 1e3]], axis=0))
@@ -89,14 +89,14 @@ class Renderer:
         light *= random.uniform(0.85, 1.1)
         # stored as sRGB-like values: products of encoded colour and encoded light need no power per pixel
         encoded = np.clip(light, 0.02, 1.35) ** (1 / 2.2)
-        self._shade = _affine_table(encoded * (1 - glow) + 1.2 * glow)  # what glows outshines the room
+        self._shade = _affine_table(encoded * (1 - glow) + 1.2 * glow)  # emission outshines the room
         warm = random.uniform(-0.5, 1.0)
         lit, dim = np.array([1 + 0.05 * warm, 1.0, 1 - 0.09 * warm]), np.array([0.95, 0.99, 1.04])
         gain = (lit - 0.3 * dim) / 0.7  # light 1 has the lamps' colour, light 0.3 the cooler one of the shadows
         self._tints = list(zip(gain.astype(np.float32), (lit - gain).astype(np.float32), strict=True))
 
     def _blur_per_m(self, eye: F32) -> F32:
-        """Texels per pixel of each triangle at one metre from here; slanted surfaces are a little more blurred."""
+        """Texels per pixel of each triangle at 1 m from the eye; more for slanted surfaces."""
         way = [middle - along for middle, along in zip(self._middle, eye, strict=True)]
         slant = np.abs(_dot(way, self._normal)) / np.sqrt(_dot(way, way) + np.float32(1e-6))
         return np.asarray(self._texels_per_px_m / np.sqrt(np.maximum(slant, np.float32(0.1))), np.float32)
@@ -128,7 +128,7 @@ class Renderer:
         view.color[rows] = cv2.add(color, cv2.merge((highlight, highlight, highlight)))
 
     def _highlight(self, triangle: I64, rays: F32, depth: F32, eye: F32) -> U8:
-        """(N,) levels to add where glossy surfaces mirror the nearest lamp, or look pale at a grazing view."""
+        """(N,) brightness to add where glossy surfaces mirror the nearest lamp or are seen at a grazing angle."""
         gloss = self._gloss.take(triangle, mode="wrap")
         added = np.zeros(len(gloss), np.uint8)
         glossy = np.flatnonzero(gloss > 0.04)
@@ -145,7 +145,7 @@ class Renderer:
 
 
 def _columns(rows: F64) -> list[F32]:
-    """The columns of a table, each by itself: that much faster than rows to look up and to multiply."""
+    """The columns of a table as separate arrays, which are faster to look up and multiply than rows."""
     return [np.ascontiguousarray(rows[:, k], np.float32) for k in range(rows.shape[1])]
 
 
@@ -162,7 +162,7 @@ def _affine_table(values: F64) -> tuple[F32, F32, F32]:
 
 
 def _interpolate(table: tuple[F32, F32, F32], triangle: I64, u: F32, v: F32) -> F32:
-    """The corner values interpolated at barycentric (u, v) of each pixel's triangle."""
+    """Corner values interpolated at barycentric (u, v) of each pixel's triangle."""
     base, along_u, along_v = (values.take(triangle, mode="wrap") for values in table)
     along_u *= u
     along_v *= v

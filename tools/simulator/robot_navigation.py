@@ -1,6 +1,6 @@
-"""The free floor: where a robot can stand on it, the ways over it, how it goes and turns, what a room shows it.
+"""Free space of a floor, routes through it, the motion of the robot, and what is visible in a room.
 
-Positions are metres in the world frame, headings radians from x to y. A path never leaves the free cells.
+Positions are metres in the world frame, headings radians from x to y. A path stays on free cells.
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from placegraph.runtime.arrays import F64, I32, I64, Bool
 from placegraph.tools.simulator.house_model import ON_FLOOR, Floor, House, Room
 
-STEP_S = 0.02  # of the motion; frames are read off in between
-NEAR_M, FAR_M = 0.6, 4.5  # how far from a lookout a thing is seen well
+STEP_S = 0.02  # of the motion; frames are interpolated
+NEAR_M, FAR_M = 0.6, 4.5  # distances at which an item is seen well
 LOW, HIGH = np.radians(-40.0), np.radians(10.0)  # elevations that the downward looking camera sees
-TALL_M = 1.4  # furniture from here on hides what is behind
+TALL_M = 1.4  # higher furniture occludes
 ITEM_WORTH, WALL_WORTH = 1.0, 0.4
-ROOMY_CLEARANCE_M = (
-    0.35  # from a cell that is free for the robot to the next that is not: from here on room costs nothing
-)
+ROOMY_CLEARANCE_M = 0.35  # no cost for clearance above this
 SPACING_M = 0.02  # between the points of a path
 LOOK_AHEAD_M = 0.5
 TURN_RADII_M = (0.35, 0.25, 0.15, 0.08)  # radii of the circle on which the robot looks around
@@ -34,14 +32,14 @@ ACCELERATION = 0.7  # m/s^2
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
-    """Where the middle of the robot may be on one floor: free (H, W), rows along y, from a corner at origin_m."""
+    """Where the centre of the robot may be on one floor: free (H, W), rows along y, with a corner at origin_m."""
 
     origin_m: F64
     free: Bool
     cell_m: float
     clearance_m: F64  # (H, W) from a cell to the nearest that is not free; 0 there
     graph: csr_array  # (H * W, H * W) costs of steps between neighbouring free cells
-    reachable: Bool  # (H * W,) the largest part of the free cells that hangs together
+    reachable: Bool  # (H * W,) the largest connected part of the free cells
 
     def cells(self, xy: F64) -> NDArray[np.intp]:
         """(N,) flat indices of the cells that hold points (N, 2), world frame; -1 outside of the grid."""
@@ -65,7 +63,7 @@ class FreeSpace:
         return int(cells[np.argmin(np.linalg.norm(self.middles(cells) - xy, axis=1))])
 
     def turn_radius(self, xy: F64, heading: float) -> float:
-        """The radius of the largest circle, of a few, through xy (2,) about a point straight ahead that is all free."""
+        """The largest of a few radii with which a circle through xy (2,), centred straight ahead, is free."""
         angles = np.linspace(0, 2 * np.pi, 120)
         ring = np.stack((np.cos(angles), np.sin(angles)), axis=1) + unit_vector(heading)
         return next((radius for radius in TURN_RADII_M if self.clearance(xy + radius * ring).min() > self.cell_m), 0.0)
@@ -73,7 +71,7 @@ class FreeSpace:
 
 @dataclass(frozen=True, eq=False)
 class RouteField:
-    """The cheapest ways from all cells to one: cost (H * W,), infinite where there is none, and the next cell."""
+    """The cheapest routes from all cells to one: cost (H * W,), infinite without a route, and the next cell."""
 
     goal: int
     cost: F64
@@ -81,7 +79,7 @@ class RouteField:
 
 
 def build_free_space(origin_m: F64, free: Bool, cell_m: float) -> FreeSpace:
-    """The ground of a free grid (H, W), rows along y, whose first corner is at origin_m (2,), world frame."""
+    """The free space of a grid (H, W), rows along y, whose first corner is at origin_m (2,), world frame."""
     padded = np.pad(free, 1)  # what lies beyond the grid is not free
     clearance = np.asarray(distance_transform_edt(padded), float)[1:-1, 1:-1] * cell_m
     toll = 1.0 + 4.0 * np.clip(1.0 - clearance / ROOMY_CLEARANCE_M, 0.0, 1.0)
@@ -106,13 +104,13 @@ def build_free_space(origin_m: F64, free: Bool, cell_m: float) -> FreeSpace:
 
 
 def routes_to(free_space: FreeSpace, goal: int) -> RouteField:
-    """The cheapest ways to a cell from everywhere."""
+    """The cheapest routes to a cell from everywhere."""
     cost, next_cell = dijkstra(free_space.graph, directed=False, indices=goal, return_predecessors=True)
     return RouteField(goal, cost, next_cell)
 
 
 def route(free_space: FreeSpace, routes: RouteField, start_xy: F64) -> F64:
-    """(N, 2) a smooth path on free cells from a point (2,) whose cell has a way to the goal's middle, metres, world."""
+    """(N, 2) a smooth path on free cells from a point (2,) to the goal's centre, metres, world frame."""
     cells = [int(free_space.cells(start_xy)[0])]
     while cells[-1] != routes.goal:
         cells.append(int(routes.next_cell[cells[-1]]))
@@ -121,7 +119,7 @@ def route(free_space: FreeSpace, routes: RouteField, start_xy: F64) -> F64:
 
 
 def resample(points: F64, spacing_m: float = SPACING_M) -> F64:
-    """(M, D) the polyline (N, D) with a point every spacing_m or a little less."""
+    """(M, D) the polyline (N, D) with points at most spacing_m apart."""
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     along = np.concatenate(([0.0], np.cumsum(lengths)))
     if along[-1] == 0.0:
@@ -131,7 +129,7 @@ def resample(points: F64, spacing_m: float = SPACING_M) -> F64:
 
 
 def _shortcut(free_space: FreeSpace, points: F64) -> F64:
-    """Straight lines instead of stretches (of at most 3 m) of the path, where they keep as clear of obstacles."""
+    """The path with straight lines of up to 3 m where they keep the same clearance."""
     clear = free_space.clearance(points)
     kept_indices = [0]
     while kept_indices[-1] < len(points) - 1:
@@ -147,7 +145,7 @@ def _shortcut(free_space: FreeSpace, points: F64) -> F64:
 
 
 def _smoothed(free_space: FreeSpace, points: F64) -> F64:
-    """The path with round corners: its points move between their neighbours as long as they stay clear of obstacles."""
+    """The path with rounded corners: points move towards the middle of their neighbours while clearance allows."""
     path = resample(points, 0.05)
     for _ in range(80):
         clear = np.minimum(free_space.clearance(path), 0.4 * ROOMY_CLEARANCE_M)
@@ -163,7 +161,7 @@ def _smoothed(free_space: FreeSpace, points: F64) -> F64:
 
 @dataclass
 class RobotMotion:
-    """The robot on its way: where it is, and a sample of (x, y, z, heading, speed, tilt) every STEP_S."""
+    """State of the robot, and a sample of (x, y, z, heading, speed, tilt) every STEP_S."""
 
     xyz: F64  # of the point on the floor below the camera, metres, world
     heading: float  # radians, never wrapped
@@ -174,7 +172,7 @@ class RobotMotion:
     samples: list[tuple[float, float, float, float, float, float]] = field(default_factory=list)
 
     def follow(self, points: F64, tilt: float = 0.0) -> None:
-        """Goes along a path (N, 3), metres, world frame, looking along it (`tilt` radians further down)."""
+        """Moves along a path (N, 3), metres, world frame, looking ahead (`tilt` radians further down)."""
         path = resample(points)
         if len(path) < 2:
             return
@@ -193,9 +191,9 @@ class RobotMotion:
             self._sample()
 
     def turn_to(self, goals: list[float], radius_m: float) -> None:
-        """Turns to headings one after the other, on a circle of a radius about the point this far straight ahead."""
+        """Turns to headings one after the other on a circle whose centre is `radius_m` straight ahead."""
         middle = self.xyz[:2] + radius_m * unit_vector(self.heading)
-        for goal in goals:  # the last few degrees to the next goal are turned on the way there
+        for goal in goals:  # the last few degrees are turned while moving on
             while abs(goal - self.heading) > np.radians(30.0 if goal == goals[-1] else 10.0):
                 self._turn(goal - self.heading, 0.0)
                 self.xyz = np.append(middle - radius_m * unit_vector(self.heading), self.xyz[2])
@@ -226,7 +224,7 @@ def unit_vector(heading: float) -> F64:
 
 @dataclass(eq=False)
 class RoomVisibility:
-    """What there is to see in a room, targets (T, 3) of some worth, and what hides it, edges (E, 2, 2) from above."""
+    """Targets (T, 3) in a room with their worth, and the edges (E, 2, 2) in plan that occlude them."""
 
     room: Room
     targets: F64
@@ -239,7 +237,7 @@ class RoomVisibility:
     entered: bool = False
 
     def views(self, eyes: F64) -> tuple[Bool, F64]:
-        """Whether each eye (S, 3) can see each target, (S, T), and the bearing (S, T) of the target in radians."""
+        """(S, T) whether each eye (S, 3) sees each target, and the bearing of the target in radians."""
         way = self.targets[None] - eyes[:, None]
         flat = np.hypot(way[..., 0], way[..., 1])
         rise = np.arctan2(way[..., 2], flat)
@@ -252,7 +250,7 @@ class RoomVisibility:
 
 
 def room_visibility(house: House, floor: Floor, room: Room) -> RoomVisibility:
-    """What there is to see in a room: its items, and its walls every .6 m."""
+    """The targets of a room: its items, and points on its walls every .6 m."""
     around = np.vstack((room.polygon, room.polygon[:1]))
     walls = resample(around, 0.6)[:-1]
     items = [item for item in house.items if item.room == room.id]
@@ -290,7 +288,7 @@ def _passage_middles(floor: Floor, room: Room) -> F64:
 
 
 def _segments_cross(starts: F64, directions: F64, a: F64, side: F64) -> Bool:
-    """Which segments from starts (S, 1, 2) along ways (S, T, 2) cross the one from a (2,) along side (2,)."""
+    """Which segments from starts (S, 1, 2) along directions (S, T, 2) cross the one from a (2,) along side (2,)."""
     across = directions[..., 0] * side[1] - directions[..., 1] * side[0]
     across = np.where(np.abs(across) < 1e-12, 1e-12, across)
     gap = a - starts

@@ -1,4 +1,4 @@
-"""How the rooms of a house are joined: doors, archways and stairs, and how far a robot travels between them."""
+"""Connections of rooms: doors, archways and stairs, and the travel distances between them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NEAR_M = 1.0  # from there to a free cell, at most
 
 @dataclass(frozen=True, eq=False)
 class RoomConnection:
-    """A door, archway or stairs; ends (2, 3) lie in rooms[0] and rooms[1], of stairs foot and head, in metres."""
+    """A door, archway or stairs; ends (2, 3) are in rooms[0] and rooms[1], foot and head for stairs, in metres."""
 
     id: int  # counted from 0 in the house
     kind: str
@@ -30,7 +30,7 @@ class RoomConnection:
 
 
 def room_connections(house: House) -> tuple[RoomConnection, ...]:
-    """The passages of a house, floor by floor, stairs last; travel is that of a robot of .25 m radius, in metres."""
+    """The connections of a house, floor by floor, stairs last; travel is for a robot of .25 m radius."""
     passages = [passage for floor in house.floors for passage in _openings(floor)]
     passages += [_stair_connection(house, stairs) for stairs in house.stairs]
     travel: dict[int, list[tuple[int, float]]] = {i: [] for i in range(len(passages))}
@@ -79,7 +79,7 @@ def _stair_connection(house: House, stairs: Staircase) -> _Passage:
 
 
 def _travel_lengths(house: House, floor: Floor, places: list[tuple[int, F64]]) -> dict[tuple[int, int], float]:
-    """Metres between places on a floor, each named by the id of its passage; without those that no way joins."""
+    """Metres between places on a floor, keyed by connection ids; pairs without a route are left out."""
     origin, free = free_grid(house, floor.index, CELL_M)
     rows, columns = np.nonzero(free)
     cells, ids = [], []

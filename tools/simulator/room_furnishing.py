@@ -1,4 +1,4 @@
-"""Furniture for a laid-out house: groups by the type of a room, things on their own in corners, things on the walls."""
+"""Furnishes a house: groups by room type, single items in corners, items on the walls."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ from placegraph.tools.simulator.wall_decor import add_wall_decor
 
 GroupBuilder = Callable[[np.random.Generator, float], Iterator[GroupLayout]]
 
-SALT = 5_003  # keeps the furniture's randomness apart from what else is drawn from the seed
+SALT = 5_003  # a random stream of its own
 
-# What a room of a type holds, in the order in which it is brought in: the group, its chance, area needed in m2.
+# Groups of a room type in the order of placing: layouts, probability, smallest room area in m2.
 ROOM_GROUPS: dict[str, tuple[tuple[GroupBuilder, float, float], ...]] = {
     "living room": (
         (seating_area, 1.0, 0), (media_area, 0.95, 0), (dining_area, 0.35, 24),
@@ -83,7 +83,7 @@ DEFAULT_GROUPS = ((cupboard_area, 0.8, 0.0), (reading_area, 0.5, 6.0))
 
 
 def furnish(house: House, random_seed: int) -> House:
-    """A laid-out house with furniture, small things and locations; its floors, walls and fixtures stay as they are."""
+    """The house with furniture, small items and locations; floors, walls and fixtures stay as they are."""
     items = list(house.items)
     locations: list[FurnitureLocation] = []
     for floor in house.floors:
@@ -99,7 +99,7 @@ def furnish(house: House, random_seed: int) -> House:
 def _furnish_room(
     planner: RoomPlanner, random: np.random.Generator, items: list[PlacedItem], locations: list[FurnitureLocation]
 ) -> None:
-    """Bring in a room's groups, then the things that stand on their own."""
+    """Places the groups of a room, then single items."""
     low, high = planner.room.polygon.min(axis=0), planner.room.polygon.max(axis=0)
     x, y = planner.room.polygon.T
     area_m2 = abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
@@ -124,7 +124,7 @@ def _place_first_fit(
     items: list[PlacedItem],
     locations: list[FurnitureLocation],
 ) -> GroupPose | None:
-    """Place the first draft that fits, dressed; a draft of two things or more becomes a location."""
+    """Places the first layout that fits, with small items; two items or more become a location."""
     for layout in drafts:
         pose = planner.find_pose(layout, near)
         if pose is None:

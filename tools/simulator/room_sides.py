@@ -1,4 +1,4 @@
-"""The sides of a room: where there is wall to stand at or to hang things on, and where it is open."""
+"""The sides of a room: where there is wall to place or hang items, and where there are openings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from placegraph.tools.simulator.house_model import Floor, Room
 
 @dataclass(frozen=True)
 class WallGap:
-    """An opening as a side of a room sees it: metres along the side and above the floor."""
+    """An opening seen from a side of a room: metres along the side and above the floor."""
 
     kind: str
     start_m: float
@@ -23,13 +23,13 @@ class WallGap:
 
 @dataclass(frozen=True, eq=False)
 class RoomSide:
-    """One edge of a room's polygon: start (2,), unit ways along it and into the room, and what its wall is like."""
+    """One edge of a room's polygon: start (2,), unit vectors along it and into the room, walls and openings."""
 
     start: F64
     along: F64
     inward: F64
     length_m: float
-    walls: tuple[tuple[float, float], ...]  # metres along the side with wall behind: a parapet or open edge has none
+    walls: tuple[tuple[float, float], ...]  # metres along the side where a full-height wall is behind
     gaps: tuple[WallGap, ...]
 
     @property
@@ -47,11 +47,11 @@ class RoomSide:
         return np.concatenate((corners.min(axis=0), corners.max(axis=0)))
 
     def is_wall(self, start_m: float, end_m: float) -> bool:
-        """Whether one wall is behind all of a stretch."""
+        """Whether one wall is behind the whole stretch."""
         return any(a - 0.02 <= start_m and end_m <= b + 0.02 for a, b in self.walls)
 
     def is_closed(self, start_m: float, end_m: float, low_m: float, high_m: float, margin_m: float) -> bool:
-        """Whether no opening comes nearer than a margin to a stretch between two heights above the floor."""
+        """Whether no opening is within a margin of a stretch between two heights above the floor."""
         return not any(
             start_m < gap.end_m + margin_m
             and gap.start_m < end_m + margin_m
@@ -89,7 +89,7 @@ def room_sides(room: Room, floor: Floor) -> tuple[RoomSide, ...]:
 
 
 def _merged(stretches: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Stretches that touch, as one."""
+    """Stretches that touch, merged."""
     merged: list[tuple[float, float]] = []
     for start, end in sorted(stretches):
         if merged and start <= merged[-1][1] + 0.3:  # a crossing wall's thickness may lie between

@@ -1,4 +1,4 @@
-"""What floors, walls and ceilings of a room look like, by its type."""
+"""Materials of the floors, walls and ceilings of a room by its type."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def trim_material(random: np.random.Generator) -> Material:
 
 
 def room_finish(random: np.random.Generator, room_type: str) -> Finish:
-    """What a room of a type is covered with."""
+    """The random finish of a room of a type."""
     wall, dado, dado_m = _wall(random), None, 0.0
     if room_type in WET:
         dado, dado_m = _tiles(random, 0.12, 0.3), float(random.choice([1.2, 1.5, 2.0]))

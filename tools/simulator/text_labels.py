@@ -1,4 +1,4 @@
-"""Words on a drawing that do not cover each other."""
+"""Text labels on a drawing that do not overlap."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Label:
 
 
 class LabelLayout:
-    """Words for one image (H, W, 3) RGB: placed one after the other, drawn at the end."""
+    """Labels for one image (H, W, 3) RGB, placed one after the other and drawn at the end."""
 
     def __init__(self, image: U8) -> None:
         self._image, self._font = image, cv2.FontFace("sans")
@@ -42,7 +42,10 @@ class LabelLayout:
         bold: bool = False,
         must: bool = False,
     ) -> None:
-        """Place a word at the first of the centres (px) where it covers no other, else nowhere, or at the first."""
+        """Places a label at the first of the centres (px) where it overlaps no other label.
+
+        Without such a centre the label is omitted, or with `must` placed at the first one.
+        """
         for center in centers:
             box = self._box(text, center, size_px, bold)
             if not any(_boxes_overlap(box, taken) for taken in self._taken):
@@ -61,7 +64,7 @@ class LabelLayout:
             self.write(label.text, label.center, label.size_px, label.color, label.bold)
 
     def write(self, text: str, center: tuple[float, float], size_px: int, color: Color, bold: bool = False) -> None:
-        """Write one word around a centre (px), with a light rim that keeps it readable on any ground."""
+        """Writes one label around a centre (px) with a light halo."""
         x0, y0, x1, y1 = self._box(text, center, size_px, bold)
         edge = size_px  # room for descenders and the rim
         top, left = max(int(y0) - edge, 0), max(int(x0) - edge, 0)

@@ -1,7 +1,7 @@
-"""What surfaces look like close by: each material painted once into a small tile, all tiles in one atlas image.
+"""Procedural textures: each material is painted into a small tile, and all tiles are packed in one atlas image.
 
-Every tile is stored at six sizes (mipmaps, so that distant patterns average out instead of flickering), each with a
-border of one pixel, so that one bilinear lookup of the whole frame in the atlas reads the right material everywhere.
+Every tile is stored at six sizes (mipmaps) with a border of one pixel, so that one bilinear lookup of the whole frame
+in the atlas reads the right material everywhere.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LEVEL_SIZES_PX = np.array([TILE_PX >> level for level in range(LEVELS)], np.floa
 LEVEL_LEFT_PX = np.array([sum((TILE_PX >> k) + 2 for k in range(level)) for level in range(LEVELS)], np.float32)
 _CELL_WIDTH_PX = int(sum(LEVEL_SIZES_PX)) + 2 * LEVELS
 _CELL_HEIGHT_PX = TILE_PX + 2
-_ROWS = 240  # cells above each other: cv2.remap reads no coordinate beyond 32767
+_ROWS = 240  # atlas rows: cv2.remap reads no coordinate beyond 32767
 _PLAIN_PX = 3  # a plain material needs no more than one pixel and its neighbours
 
 _V, _U = np.meshgrid((np.arange(TILE_PX) + 0.5) / TILE_PX, (np.arange(TILE_PX) + 0.5) / TILE_PX, indexing="ij")
@@ -41,7 +41,7 @@ class Atlas:
 
 
 def _tileable_noise(random: np.random.Generator, across: int, down: int) -> F64:
-    """Smooth noise that repeats at the tile's borders, about -1..1, of `across` x `down` bumps: (128, 128)."""
+    """(128, 128) smooth noise that repeats at the borders, about -1..1, with `across` x `down` bumps."""
     coarse = np.pad(random.uniform(-1, 1, (down, across)), 2, mode="wrap")
     step_x, step_y = TILE_PX / across, TILE_PX / down
     x = (np.arange(TILE_PX, dtype=np.float32) + 0.5) / step_x + 1.5
@@ -59,7 +59,7 @@ def _mix_colors(material: Material, share: F64 | float, light: F64 | float = 0.0
 
 
 def _joints(count_u: int, count_v: int, width: float, shift: float = 0.0) -> tuple[Bool, I64]:
-    """Joints of a running bond: the mask of joints and each pixel's block number."""
+    """Joints of a running bond: the mask of joints and the block number of each pixel."""
     row = np.floor(_V * count_v).astype(int)
     u = (_U * count_u + shift * row) % count_u
     column = np.floor(u).astype(int)
@@ -139,7 +139,7 @@ def _leaves(material: Material, random: np.random.Generator) -> F64:
 
 
 def _books(material: Material, random: np.random.Generator) -> F64:
-    """Spines side by side on a dark back; the material's colour is the most frequent spine, `second` the back."""
+    """Book spines on a dark back; the material's colour is the most frequent spine, `second` the back."""
     image = np.ascontiguousarray(_mix_colors(material, 1.0) * (0.45 + 0.4 * _V[..., None]))
     x = 0
     while x < TILE_PX - 2:
@@ -235,11 +235,7 @@ _PAINTERS: dict[str, Callable[[Material, np.random.Generator], F64]] = {
 
 
 def tile(material: Material) -> U8:
-    """The (128, 128, 3) uint8 sRGB picture of one repeat, rows from its upper edge down.
-
-    Raises:
-        ConfigError: the material names no texture of model.TEXTURES.
-    """
+    """The (128, 128, 3) uint8 sRGB image of one repeat; raises ConfigError for an unknown texture."""
     if material.texture == "plain":
         return np.broadcast_to(np.array(material.color, np.uint8), (TILE_PX, TILE_PX, 3)).copy()
     if material.texture not in _PAINTERS:
@@ -249,7 +245,7 @@ def tile(material: Material) -> U8:
 
 
 def atlas(materials: Sequence[Material]) -> Atlas:
-    """All materials' tiles in one image; a plain material is a few pixels in the strip at its right."""
+    """The tiles of all materials in one image; plain materials are a few pixels in the strip at its right."""
     textured = [k for k, material in enumerate(materials) if material.texture != "plain"]
     plain = [k for k, material in enumerate(materials) if material.texture == "plain"]
     columns = -(-len(textured) // _ROWS)

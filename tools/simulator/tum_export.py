@@ -1,4 +1,4 @@
-"""A house as a TUM RGB-D folder, with the truth beside it; the same bytes from any number of processes.
+"""Writes a house as a TUM RGB-D folder with its ground truth; the bytes do not depend on the number of processes.
 
 Source: the folder format that nodes/camera/tum.py reads.
 """
@@ -49,7 +49,7 @@ MIN_CLEAR_FRAMES = 5  # of what is asked about
 
 @dataclass(frozen=True)
 class HouseOrder:
-    """Which house, seen how: the seed, its floors (None: the seed chooses), frames at most (0: all), image size.
+    """Which house to film and how: seed, floors (None: the seed chooses), frames at most (0: all), image size.
 
     moved: pieces of furniture that are moved before the house is filmed a second time; 0: it is filmed once.
     """
@@ -66,18 +66,18 @@ class HouseOrder:
         return HouseFrames(self.seed, self.floors, self.width, self.height, self.moved)
 
     def run(self, frames: int, frames_before: int) -> HouseRun:
-        """What a folder says that is made to this order by this very generator."""
+        """The run record of a folder made to this order by this generator."""
         size = self.width, self.height
         version = generator_version()
         return HouseRun(self.seed, self.floors, self.limit, *size, version, frames, self.moved, frames_before)
 
     def is_made_by(self, run: HouseRun) -> bool:
-        """Whether a folder that says this of itself is what is asked for, made by this very generator."""
+        """Whether a run record matches this order and this generator."""
         return run == self.run(run.frames, run.frames_before)
 
 
 def export(order: HouseOrder, out: Path, workers: int | None = None, quiet: bool = True) -> HouseRun:
-    """Write a house folder, by so many processes (None: one for each core); `out` must be absent or empty.
+    """Writes a house folder with `workers` processes (None: one per core); `out` must be absent or empty.
 
     Raises SourceError when the folder cannot be written.
     """
@@ -99,7 +99,7 @@ def export(order: HouseOrder, out: Path, workers: int | None = None, quiet: bool
             )
         ):
             if index == source.frames_before:
-                views[list(changed)] = 0  # seen where they no longer are
+                views[list(changed)] = 0  # frames before the move do not count
             views[:, 0] += pixels > 0
             views[:, 1] += pixels >= CLEAR_SHARE * order.width * order.height
         _write_lists(source, count, folder)
@@ -115,7 +115,7 @@ def export(order: HouseOrder, out: Path, workers: int | None = None, quiet: bool
 
 
 def _write_questions(house: House, seen: tuple[FrameCounts, ...], folder: Path) -> None:
-    """Questions about what the walk showed clearly: target and anchors."""
+    """Questions whose target and anchors were clearly visible."""
     shown = {counts.id for counts in seen if counts.clear_frames >= MIN_CLEAR_FRAMES}
     asked = [
         question
@@ -128,7 +128,7 @@ def _write_questions(house: House, seen: tuple[FrameCounts, ...], folder: Path) 
 
 @contextmanager
 def _atomic_folder(out: Path) -> Iterator[Path]:
-    """A folder beside `out` that takes its place at the end; a run that stops before leaves nothing."""
+    """A temporary folder beside `out` that replaces it at the end; an interrupted run leaves nothing."""
     part = out.with_name(f".{out.name}.{os.getpid()}.part")
     try:
         part.mkdir(parents=True)
@@ -141,7 +141,7 @@ def _atomic_folder(out: Path) -> Iterator[Path]:
 
 
 def _frames(order: HouseOrder, source: HouseFrames, folder: Path, workers: int) -> Iterator[I64]:
-    """Write the images of every frame; gives the pixels of each object (items,), frame by frame."""
+    """Writes the images of every frame; yields the pixels of each object (items,) frame by frame."""
     count = source.count(order.limit)
     if min(workers, count) <= 1:
         yield from (_write_frame(source.frame(index), folder, len(source.house.items)) for index in range(count))
@@ -154,11 +154,11 @@ def _frames(order: HouseOrder, source: HouseFrames, folder: Path, workers: int) 
         pool.shutdown(cancel_futures=True)
 
 
-_worker: dict[str, Any] = {}  # what a worker process makes once: its own copy of the house, and where to write
+_worker: dict[str, Any] = {}  # per worker process: its copy of the house, and the output folder
 
 
 def _start_worker(order: HouseOrder, folder: Path) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the process that started this one, which ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent process, which stops the workers
     cv2.setNumThreads(1)  # there is a process for each core
     _worker["source"] = order.frames()
     _worker["folder"] = folder

@@ -1,4 +1,4 @@
-"""What hangs on walls and ceilings or is at windows: pictures, clocks, mirrors, towels, lamps, curtains, radiators."""
+"""Items on walls, ceilings and windows: pictures, clocks, mirrors, towels, lamps, curtains, radiators."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from placegraph.tools.simulator.house_model import NOWHERE, ON_CEILING, ON_WALL,
 from placegraph.tools.simulator.occupancy_grid import points_in_polygon
 from placegraph.tools.simulator.room_sides import RoomSide, WallGap
 
-OFF_WALL_M = 0.006  # a lining must not show through
+OFF_WALL_M = 0.006  # keeps the wall's surface from showing through
 CORNER_M = 0.1
 MIDDLE_M = 1.5  # height of the middle of pictures: eye level
 COLD_ROOMS = ("hallway", "corridor")
@@ -19,7 +19,7 @@ Random = np.random.Generator
 
 
 def add_wall_decor(planner: RoomPlanner, house: House, random: Random, first_id: int) -> list[PlacedItem]:
-    """Everything on the walls and the ceiling of one room, ids from `first_id`; the site notes it, too."""
+    """Everything on the walls and the ceiling of one room, ids from `first_id`; also added to the planner."""
     start = len(planner.items)
     _windows(planner, random, first_id)
     for name, count in _wall_item_counts(planner.room.type, float(random.random()), random):
@@ -33,7 +33,7 @@ def add_wall_decor(planner: RoomPlanner, house: House, random: Random, first_id:
 
 
 def _wall_item_counts(room_type: str, roll: float, random: Random) -> list[tuple[str, int]]:
-    """Classes and how many of each to hang in a room."""
+    """The classes to hang in a room and how many of each."""
     if room_type in ("bathroom", "laundry"):
         return [("towel", int(roll < 0.5)), ("clock", int(roll > 0.9))]
     if room_type == "kitchen":
@@ -44,7 +44,7 @@ def _wall_item_counts(room_type: str, roll: float, random: Random) -> list[tuple
 
 
 def _wall_item(name: str, random: Random) -> tuple[Item, float]:
-    """A design for the wall and the height of its lowest point above the floor."""
+    """An item for the wall and the height of its lowest point above the floor."""
     if name == "towel":
         return design(name, random, width_m=float(random.uniform(0.4, 0.55)), height_m=0.65, depth_m=0.08), 0.75
     if name == "mirror":
@@ -64,7 +64,7 @@ def _hang_at(
 
 
 def _random_wall_place(planner: RoomPlanner, item: Item, z: float, random: Random, number: int) -> PlacedItem | None:
-    """A free place on a wall for an item, or None."""
+    """An item at a random free place of a wall, or None."""
     (x0, _, _), (x1, _, high) = item.extent.tolist()
     half = (x1 - x0) / 2
     for _ in range(25):
@@ -86,7 +86,7 @@ def _side_probabilities(planner: RoomPlanner) -> np.ndarray[tuple[int], np.dtype
 
 
 def _windows(planner: RoomPlanner, random: Random, first_id: int) -> None:
-    """Radiators below windows and curtains before them, where furniture leaves them room."""
+    """Radiators below and curtains in front of windows, where furniture leaves space."""
     start = len(planner.items)
     for side in planner.sides:
         for gap in side.gaps:
@@ -117,7 +117,7 @@ def _curtain(planner: RoomPlanner, side: RoomSide, gap: WallGap, random: Random)
     top = min(gap.high_m + 0.12, planner.floor.height_m - 0.06)
     middle = (gap.start_m + gap.end_m) / 2
     half = min((gap.end_m - gap.start_m) / 2 + 0.22, middle - 0.02, side.length_m - middle - 0.02)
-    for low in (0.03, max(gap.low_m - 0.1, 0.03)):  # down to the floor, or short where something stands there
+    for low in (0.03, max(gap.low_m - 0.1, 0.03)):  # to the floor, or shorter above furniture
         item = design("curtain", random, width_m=2 * half, height_m=top - low, depth_m=0.1)
         placed = _hang_at(planner, side, item, middle, low, 0)
         if planner.is_clear(placed, 0.01):
@@ -126,7 +126,7 @@ def _curtain(planner: RoomPlanner, side: RoomSide, gap: WallGap, random: Random)
 
 
 def _lamps(planner: RoomPlanner, house: House, random: Random, first_id: int) -> None:
-    """A ceiling lamp where the room's lights are, or in its middle."""
+    """A ceiling lamp at each light of the room, or in its middle."""
     floor, number = planner.floor, first_id
     polygon, ceiling_m = planner.room.polygon, floor.z_m + floor.height_m
     spots = [

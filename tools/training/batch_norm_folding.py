@@ -1,7 +1,7 @@
-"""Networks as they are refined and packed: without batch norm, with a table of words; the packaged weights as a start.
+"""Folds batch norm into convolutions, and reads the packaged weights back into a PyTorch network.
 
-Batch norm takes half of a training step on a CPU. Once a network is trained it is folded into the convolutions
-(exactly, as every export does), and training goes on without it.
+Batch norm takes half of a training step on a CPU. After the first training it is folded into the convolutions, which is
+exact, and training continues without it.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from placegraph.tools.training.word_projection import KNOWN_WORDS, WordProjectio
 
 
 def fold_batch_norm(network: ObjectNetwork) -> ObjectNetwork:
-    """The same network with every batch norm folded into the convolution before it, and KnownWords in place of Words.
+    """The network with every batch norm folded into its convolution, and a WordTable in place of WordProjection.
 
-    Changes and returns `network` itself; gives the same for every word of the training.
+    Changes and returns `network` itself; its outputs stay the same for every word of the training.
     """
     assert isinstance(network.words, WordProjection), "already folded"
     network.eval()
@@ -40,9 +40,10 @@ def fold_batch_norm(network: ObjectNetwork) -> ObjectNetwork:
 
 
 def packaged_start(detector: Path, tagger: Path) -> ObjectNetwork:
-    """A folded network with the weights of INT8 files: the detector's, and the dense head of the tagger.
+    """A folded network with the weights of the packaged INT8 files: the detector, and the tagger's dense head.
 
-    Where the network has grown since (more steps in a Csp), what is new begins by adding nothing. Raises ModelError.
+    Where the network has more steps in a Csp than the files, the new ones start by adding nothing. Raises ModelError
+    when weights are missing.
     """
     network = fold_batch_norm(ObjectNetwork())
     packaged = {name.removeprefix("network."): weights for name, weights in _weights_by_module(detector).items()}
@@ -58,7 +59,7 @@ def packaged_start(detector: Path, tagger: Path) -> ObjectNetwork:
 
 
 def _pad_inputs(weights: F32, place: Tensor, name: str) -> Tensor:
-    """Weights with columns of zeros for the inputs that are new."""
+    """Weights with zero columns for new input channels."""
     start = torch.from_numpy(weights.copy())
     if start.shape == place.shape:
         return start
@@ -70,7 +71,7 @@ def _pad_inputs(weights: F32, place: Tensor, name: str) -> Tensor:
 
 
 def _weights_by_module(file: Path) -> dict[str, F32]:
-    """Float weights by the names of their modules in PyTorch; the nodes of an exported file hold those."""
+    """Float weights of an ONNX file by PyTorch module name, read from the names of its nodes."""
     graph = onnx.load(str(file)).graph
     plain = {weights.name: numpy_helper.to_array(weights) for weights in graph.initializer}
     for node in graph.node:

@@ -1,4 +1,4 @@
-"""`placegraph train`: from houses to the embedded networks, in steps that can be stopped and gone on with."""
+"""`placegraph train`: trains the embedded networks; every step resumes from its checkpoint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From shards to augmented batches: zoom, shift, mirror, colour; boxes follow exactly."""
+"""Rendered views as augmented training batches: zoom, shift, mirror, colour; boxes follow exactly."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MIN_CUT = 0.3  # an object cut by the border counts while so much of its visible
 
 @dataclass(frozen=True, eq=False)
 class Shard:
-    """The views of one house, see views.py; `shown` is the class by instance value, boxes (M, 7) without the view."""
+    """The views of one house (view_rendering.py); `shown` is the class by instance value, boxes are (M, 7)."""
 
     color: U8
     depth: U16
@@ -33,8 +33,10 @@ class Shard:
 
 @dataclass(frozen=True, eq=False)
 class TrainingSample:
-    """One augmented view at network size: color (H, W, 3), boxes (M, 4) px, classes (M,), which of them count (M,),
-    ids (M,), instance (H, W), depth (H, W) in m, and the class at the middle of each stride-8 cell (A8,), -1: none.
+    """One augmented view at network size.
+
+    color (H, W, 3), boxes (M, 4) px, classes (M,), which of them count (M,), ids (M,), instance (H, W), depth (H, W) in
+    m, and the class at the centre of each stride-8 cell (A8,), -1: none.
     """
 
     color: U8
@@ -48,7 +50,7 @@ class TrainingSample:
 
 
 def load_shards(folder: Path) -> list[Shard]:
-    """Every shard of a folder, by seed, mapped into memory; raises SourceError when there is none."""
+    """All shards of a folder by seed, memory-mapped; raises SourceError when there is none."""
     folders = sorted((path for path in folder.glob("*") if path.name.isdigit()), key=lambda path: int(path.name))
     if not folders:
         raise SourceError(f"{folder}: no shards; render them with `placegraph train views`")
@@ -88,7 +90,7 @@ class Augmentation:
         self._order: list[int] = []
 
     def sample(self) -> TrainingSample:
-        """The next view: every view comes once (or so often as its rarest class asks for) before any comes again."""
+        """The next view: every view comes once (or as often as its rarest class requires) before any is repeated."""
         if not self._order:
             counts = np.floor(self._repeats + self._random.random(len(self._repeats))).astype(int)
             self._order = self._random.permutation(np.repeat(np.arange(len(self._views)), counts)).tolist()
@@ -182,14 +184,14 @@ def repeat_factors(shards: list[Shard], common: float) -> F64:
 
 
 def batches(augment: Augmentation, size: int, ahead: int = 6) -> Iterator[list[TrainingSample]]:
-    """Endless batches, prepared by one thread beside the training."""
+    """Endless batches, prepared by a background thread."""
     ready: queue.Queue[list[TrainingSample] | Exception] = queue.Queue(ahead)
 
     def prepare() -> None:
         try:
             while True:
                 ready.put([augment.sample() for _ in range(size)])
-        except Exception as error:  # handed on, or the training would wait for ever
+        except Exception as error:  # raised in the consumer, which would otherwise wait forever
             ready.put(error)
 
     threading.Thread(target=prepare, daemon=True).start()

@@ -1,7 +1,7 @@
-"""Losses of the ObjectNetwork: boxes and words by task-aligned assignment, and what each stride-8 cell shows.
+"""Losses of the ObjectNetwork: boxes and words by task-aligned assignment, and the dense head.
 
-Source: TOOD's task-aligned assignment as YOLOv8 uses it (top 10 by score^.5 IoU^6); CIoU (Zheng 2020). Departs: binary
-cross entropy is focused (Lin 2017) on the dense head, whose cells mostly show nothing.
+Source: TOOD's task-aligned assignment as in YOLOv8 (top 10 by score^.5 IoU^6); CIoU (Zheng 2020). Not as in YOLOv8:
+the binary cross entropy of the dense head is focal (Lin 2017), because most of its cells show nothing.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ BOX_WEIGHT, CLASS_WEIGHT, DENSE_WEIGHT, TAG_WEIGHT = 5.0, 0.5, 1.0, 0.05
 
 @dataclass(frozen=True, eq=False)
 class DetectionTargets:
-    """What a batch shows: boxes (M, 4), prompt of each (M,), whether it counts (M,), a list an image; cells (B, A8):
-    the prompt of each stride-8 cell, -1 for none; tags (B, N): 1 shown, 0 not, nan too little to count.
+    """Targets of a batch.
+
+    boxes (M, 4), prompt of each (M,), whether it counts (M,), one list entry per image; cells (B, A8): the prompt of
+    each stride-8 cell, -1 for none; tags (B, N): 1 shown, 0 not, nan too little to count.
     """
 
     boxes: list[Tensor]
@@ -36,7 +38,7 @@ class DetectionTargets:
 
 
 def detection_targets(samples: Sequence[TrainingSample], prompts: int) -> DetectionTargets:
-    """Targets of a batch that is asked for `prompts` words; word i is that of class i as far as there are classes."""
+    """Targets of a batch for `prompts` words; word i is that of class i while there are classes."""
     tags = np.zeros((len(samples), prompts), np.float32)
     for k, sample in enumerate(samples):
         tags[k, sample.classes[~sample.counts]] = np.nan
@@ -53,7 +55,7 @@ def detection_targets(samples: Sequence[TrainingSample], prompts: int) -> Detect
 def losses(
     outputs: tuple[Tensor, Tensor, Tensor], targets: DetectionTargets, height: int, width: int
 ) -> dict[str, Tensor]:
-    """Weighted losses by name, each a mean a sample."""
+    """Weighted losses by name, each a mean per sample."""
     distances, logits, dense = (part.float() for part in outputs)
     centres, strides = anchors(height, width)
     reach = functional.softplus(distances) * strides
@@ -92,13 +94,13 @@ def losses(
 def assign_anchors(
     predicted_boxes: Tensor, scores: Tensor, boxes: Tensor, prompts: Tensor, centres: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Which box each anchor answers for (A,), -1 for none, and the target score (A,).
+    """The box assigned to each anchor (A,), -1 for none, and the target score (A,).
 
-    found: (A, 4) px; scores: (N, A); boxes: (M, 4); prompts: (M,); centres: (A, 2).
+    predicted_boxes: (A, 4) px; scores: (N, A); boxes: (M, 4); prompts: (M,); centres: (A, 2).
     """
     overlap = iou(boxes, predicted_boxes)  # (M, A)
     inside = (centres[None] > boxes[:, None, :2]).all(-1) & (centres[None] < boxes[:, None, 2:]).all(-1)
-    # a thing smaller than a cell may hold no cell centre: the nearest anchors stand in
+    # an object smaller than a cell may contain no centre: the nearest anchors are used
     off = torch.cdist((boxes[:, :2] + boxes[:, 2:]) / 2, centres)
     inside |= off <= torch.sort(off, dim=1)[0][:, 2:3]
     metric = scores[prompts] ** SCORE_POWER * overlap**IOU_POWER * inside + 1e-9 * inside
@@ -118,7 +120,7 @@ def assign_anchors(
 
 
 def _ignore_anchors(weight: Tensor, boxes: Tensor, prompts: Tensor, centres: Tensor) -> None:
-    """Anchors inside an object that is too small or cut off are neither right nor wrong for its word."""
+    """Anchors inside an object that is too small or cut off get no loss for its word."""
     for box, prompt in zip(boxes, prompts, strict=True):
         inside = ((centres > box[:2] - 8) & (centres < box[2:] + 8)).all(-1)
         weight[prompt, inside] = 0.0

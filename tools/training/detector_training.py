@@ -1,4 +1,4 @@
-"""Train the ObjectNetwork: detector and dense head together, prompted by words drawn anew for each batch."""
+"""Trains the ObjectNetwork: detector and dense head together, with words drawn for each batch."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from placegraph.tools.training.detection_losses import detection_targets, losses
 from placegraph.tools.training.networks import ObjectNetwork
 from placegraph.tools.training.word_projection import OTHER_WORDS
 
-# height and width in px of most steps, where they cost less, and of the last ones; the network runs at the very last
+# height and width in px of most steps, which are cheaper, and of the last ones; the network runs at the last size
 FIRST_SIZES = (256, 320), (320, 416)
 SIZES = (384, 512), (480, 640)
 SMALL_SHARE = 0.8  # of all steps
@@ -31,7 +31,7 @@ OTHERS = 10  # of the words of things never shown, in a batch
 
 
 class Prompts:
-    """Words for a batch: for each class one of its training words, then some words of things that are never shown."""
+    """Words for a batch: one training word of each class, then words of things that are never shown."""
 
     def __init__(self, seed: int) -> None:
         encoder = TextEncoder()
@@ -42,7 +42,7 @@ class Prompts:
     def draw(self) -> Tensor:
         """(classes + OTHERS, 256) unit rows."""
         random = self._random
-        # the name itself half of the time: it is what the tagger will say
+        # the class name in half of the draws, because the tagger uses it
         rows = [words[0 if random.random() < 0.5 else random.integers(len(words))] for words in self._said]
         rows += list(self._others[random.permutation(len(self._others))[:OTHERS]])
         text = np.stack(rows) + random.normal(0, TEXT_NOISE, (len(rows), rows[0].shape[0]))
@@ -57,7 +57,7 @@ def image_batch(samples: list[TrainingSample]) -> Tensor:
 
 
 def train_objects(data: Path, checkpoint: Path, steps: int, seed: int = 1, threads: int = 2) -> ObjectNetwork:
-    """Train from nothing on the shards of `data`, going on from `checkpoint`; returns the averaged network."""
+    """Trains from scratch on the shards of `data`, resuming from `checkpoint`; returns the averaged network."""
     torch.manual_seed(seed)
     return _fit(ObjectNetwork(), data, checkpoint, steps, FIRST_SIZES, FIRST_RATE, seed, threads)
 
@@ -65,7 +65,7 @@ def train_objects(data: Path, checkpoint: Path, steps: int, seed: int = 1, threa
 def refine_objects(
     start: ObjectNetwork, data: Path, checkpoint: Path, steps: int, seed: int = 2, threads: int = 2
 ) -> ObjectNetwork:
-    """Train a `folded` network further, on larger images, going on from `checkpoint`; returns the averaged network."""
+    """Trains a folded network further on larger images, resuming from `checkpoint`; returns the averaged network."""
     torch.manual_seed(seed)
     return _fit(start, data, checkpoint, steps, SIZES, RATE, seed, threads)
 

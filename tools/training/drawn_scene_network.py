@@ -1,8 +1,8 @@
-"""Fit the drawn scene's network and write models_onnx/embedded/drawn_scene.onnx.
+"""Fits the network of the drawn scene and writes models_onnx/embedded/drawn_scene.onnx.
 
-A pixel's chromaticity and brightness go through one hidden layer of 1x1 convolutions to class logits, which are
-averaged over 3x3 pixels. It is fitted in numpy, in seconds, to frames of the drawn scene with other noise and other
-tints than those it is then measured on. It knows this scene's colours and nothing else.
+Chromaticity and brightness of a pixel go through one hidden layer of 1x1 convolutions to class logits, which are
+averaged over 3x3 pixels. It is fitted in numpy within seconds, to frames with other noise and tints than those it is
+measured on, and works for the colours of this scene only.
 """
 
 from __future__ import annotations

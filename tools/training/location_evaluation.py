@@ -1,7 +1,7 @@
-"""The paper's labelling recipe, and any other finder of locations, against the truth of houses: F1@delta.
+"""Compares the paper's labelling recipe, and location networks, with the true locations of houses: F1@delta.
 
 Source: paper, "Dataset Labeling" (the recipe is nodes/hierarchy/locations.py without a model); the metric is that of
-tools/evaluate/places.py. Maps are simulated (location_maps.py), rooms are the true ones.
+tools/evaluate/places.py. Maps are simulated (room_scans.py), rooms are the true ones.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LocationFinder = Callable[[RoomScan], list[F64]]  # a room to outlines (K, 2) in
 EVALUATION_SEEDS = range(9000, 9020)
 DELTAS = (0.3, 0.5, 0.7)
 SEEN_SHARE = 0.5  # of a location's members that must be in the map for it to count as seen
-SALT = 6_053  # of the mistakes made in the simulated maps
+SALT = 6_053  # a random stream of its own, for mapping errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class MappedRoom:
 
 
 def finder_for(config: LocationConfig, detector: LocationDetector | None = None) -> LocationFinder:
-    """A finder that works as the hierarchy does with these settings."""
+    """A finder that works as the hierarchy node does with these settings."""
 
     def find(scan: RoomScan) -> list[F64]:
         span = FloorSpan(scan.low_m, scan.high_m, scan.low_m, scan.high_m)
@@ -60,7 +60,7 @@ def mapped_rooms(seed: int) -> list[MappedRoom]:
 
 
 def house_iou(rooms: Sequence[MappedRoom], find: LocationFinder) -> F64:
-    """IoU (F, T) of all that was found in a house with all its true locations; 0 across rooms."""
+    """IoU (F, T) of all predicted with all true locations of a house; 0 across rooms."""
     predicted = [(number, outline) for number, room in enumerate(rooms) for outline in find(room.scan)]
     true = [(number, outline) for number, room in enumerate(rooms) for outline in room.scan.outlines]
     return overlaps(predicted, true).iou
@@ -69,7 +69,7 @@ def house_iou(rooms: Sequence[MappedRoom], find: LocationFinder) -> F64:
 def comparison(
     finders: dict[str, LocationFinder], seeds: Sequence[int] = EVALUATION_SEEDS, deltas: Sequence[float] = DELTAS
 ) -> str:
-    """A table: F1@.5 of each finder by house, then the scores over all houses, for all truths and for those seen."""
+    """A table: F1@.5 of each finder by house, then the scores over all houses, for all locations and for those seen."""
     ious: dict[str, list[F64]] = {name: [] for name in finders}
     seen: list[Bool] = []
     lines = [_row("house", "truths", *finders)]

@@ -1,4 +1,4 @@
-"""The trained location network to float and INT8 ONNX in the layout that models_onnx/yolo_locations.py reads."""
+"""Exports the trained location network to float and INT8 ONNX in the layout of models_onnx/yolo_locations.py."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The location network in PyTorch, and its losses.
+"""The location network in PyTorch and its losses.
 
-Source: YOLOv8-seg's head (boxes, class, mask coefficients over shared prototypes) on a backbone of the same blocks as
-the other embedded networks; task-aligned assignment as in detection.py; masks by cross entropy in the box and dice.
+Source: the head of YOLOv8-seg (boxes, class, mask coefficients over shared prototypes) on a backbone of the same blocks
+as the other embedded networks; assignment as in detection_losses.py; masks by cross entropy in the box and dice.
 """
 
 from __future__ import annotations
@@ -15,15 +15,16 @@ from torch.nn import functional
 from placegraph.tools.training.detection_losses import assign_anchors, ciou
 from placegraph.tools.training.networks import Conv, Csp, PooledPyramid, anchors
 
-PROTOTYPES = 32  # the YOLO-seg layout has so many
+PROTOTYPES = 32  # as in the YOLO-seg layout
 WIDTHS = (64, 80, 96)  # of the features at strides 8, 16, 32
 BOX_WEIGHT, CLASS_WEIGHT, MASK_WEIGHT, DICE_WEIGHT = 2.5, 1.0, 1.5, 1.5
-MAX_MASKS = 64  # anchors of a batch that learn their masks in one step; bounds its time
+MAX_MASKS = 64  # anchors per batch with a mask loss; bounds the time of a step
 
 
 class LocationNetwork(nn.Module):
-    """Bird's-eye image (B, 3, H, W), 0..1, to raw distances (B, 4, A), logits (B, 1, A), coefficients (B, 32, A) and
-    prototypes (B, 32, H / 4, W / 4).
+    """Bird's-eye image (B, 3, H, W), 0..1, to boxes and masks of locations.
+
+    Outputs raw distances (B, 4, A), logits (B, 1, A), coefficients (B, 32, A) and prototypes (B, 32, H / 4, W / 4).
     """
 
     def __init__(self) -> None:
@@ -81,7 +82,7 @@ class LocationExport(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class LocationTargets:
-    """What one image of a batch shows: boxes (M, 4) px, and masks (M, S / 4, S / 4) 0..1."""
+    """Targets of one image: boxes (M, 4) px, and masks (M, S / 4, S / 4) 0..1."""
 
     boxes: Tensor
     masks: Tensor

@@ -1,4 +1,4 @@
-"""Train the location network on simulated maps of rooms (location_maps.py); labels are the houses' true outlines."""
+"""Trains the location network on simulated scans of rooms (room_scans.py) with the true outlines as labels."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ TRAINING_SEEDS = range(20_000, 40_000)
 VARIANTS = 2  # walks through each house
 BATCH = 12
 RATE = 2e-3
-MIN_OBJECTS = 1  # a location of which less was mapped is none
+MIN_OBJECTS = 1  # a location with fewer mapped objects is no target
 JOINED = 0.12  # share of samples that are two rooms in one
 THIN_M = 0.04  # fewer points make the samples faster; the image closes such gaps
-NEXT_M = 0.4  # rooms so near are neighbours: a wall is thinner
+NEXT_M = 0.4  # neighbouring rooms are nearer than this
 
 
 def simulate_scans(seeds: range, folder: Path) -> None:
-    """Simulate VARIANTS walks through each house and store them in `folder`; what is there already stays."""
+    """Simulates VARIANTS walks through each house and stores them in `folder`; existing files are kept."""
     folder.mkdir(parents=True, exist_ok=True)
     for seed in seeds:
         files = [folder / f"{seed}_{variant}.npz" for variant in range(VARIANTS)]
@@ -44,7 +44,7 @@ def simulate_scans(seeds: range, folder: Path) -> None:
 
 
 class LocationSamples:
-    """Random rooms of stored scans with random mistakes, turned, mirrored and scaled, from one seed."""
+    """Random rooms of stored scans with mapping errors, rotated, mirrored and scaled, from one seed."""
 
     def __init__(self, folder: Path, seed: int) -> None:
         """Read all scans of `folder`; raises SourceError when there is none."""
@@ -59,7 +59,7 @@ class LocationSamples:
         self._order: list[int] = []
 
     def sample(self) -> tuple[U8, LocationTargets]:
-        """The next image (SIZE_PX, SIZE_PX, 3) and what it shows: every room comes once before any comes again."""
+        """The next image (SIZE_PX, SIZE_PX, 3) and its targets; every room comes once before any is repeated."""
         if not self._order:
             self._order = self._random.permutation(len(self._rooms)).tolist()
         house, k = self._rooms[self._order.pop()]
@@ -84,7 +84,7 @@ def thin_out(scan: RoomScan) -> RoomScan:
 
 
 def random_transform(scan: RoomScan, random: np.random.Generator) -> RoomScan:
-    """The room turned by any angle about z, perhaps mirrored, a little larger or smaller."""
+    """The room rotated by any angle about z, perhaps mirrored, slightly scaled."""
     angle, scale = random.uniform(0, 2 * np.pi), np.exp(random.uniform(-0.12, 0.12))
     c, s = np.cos(angle) * scale, np.sin(angle) * scale
     flat = np.array([[c, -s], [s, c]]) @ np.diag([random.choice([-1, 1]), 1])
@@ -100,7 +100,7 @@ def random_transform(scan: RoomScan, random: np.random.Generator) -> RoomScan:
 
 
 def birds_eye_sample(scan: RoomScan) -> tuple[U8, LocationTargets]:
-    """The bird's-eye image of a scan, and the true boxes and masks of the locations of which enough was mapped."""
+    """The bird's-eye image of a scan, and boxes and masks of the locations of which enough was mapped."""
     image, grid = bird_eye(scan.objects, span_of(scan), LocationConfig().band_high)
     seen = np.bincount([location for location in scan.location if location >= 0], minlength=len(scan.outlines))
     boxes, masks = [], []
@@ -127,7 +127,7 @@ def span_of(scan: RoomScan) -> FloorSpan:
 
 
 def train_locations(data: Path, checkpoint: Path, steps: int, seed: int = 3, threads: int = 1) -> LocationNetwork:
-    """Train on the scans of `data`, going on from `checkpoint`; returns the averaged network."""
+    """Trains on the scans of `data`, resuming from `checkpoint`; returns the averaged network."""
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
     samples = LocationSamples(data, seed)

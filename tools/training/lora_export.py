@@ -1,4 +1,4 @@
-"""The adapter of the reader as a GGUF file that llama.cpp loads beside the model. Source: llama-adapter.cpp."""
+"""Writes the low-rank adapter of the request reader as a GGUF file for llama.cpp. Source: llama-adapter.cpp."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from placegraph.tools.training.reader_network import ALPHA, GROUPS, ReaderNetwor
 
 
 def write_adapter(network: ReaderNetwork, path: Path, card: Mapping[str, str]) -> None:
-    """Write the low-rank pairs in half precision, replacing the file at once; card: what metadata say of it."""
+    """Writes the low-rank pairs in half precision, replacing the file atomically; card: its metadata."""
     import gguf
 
     partial = path.with_suffix(".part")

@@ -1,4 +1,4 @@
-"""Everything trained to files: float and INT8 ONNX, the tagger's labels and thresholds."""
+"""Packages trained networks: float and INT8 ONNX files, and the tagger's labels and thresholds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MIN_SHOWN = 12
 CALIBRATION_SEED = 5
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)[:, None, None]
 STD = np.array([0.229, 0.224, 0.225], np.float32)[:, None, None]
-# last layers, whose small differences matter, and what joins pixels and scores
+# last layers, whose small differences matter, and nodes that join pixels and scores
 KEEP_FLOAT = {
     "detector": (
         r"/network/boxes\.\d/boxes\.\d\.1/.*",
@@ -44,7 +44,7 @@ KEEP_FLOAT = {
 
 
 def package_networks(work: Path, calibration: Path) -> Iterator[str]:
-    """Write WORK/onnx: each network trained so far as float and INT8, tags and thresholds; says what it wrote.
+    """Writes WORK/onnx: each trained network as float and INT8, tags and thresholds; yields a line per file.
 
     Raises ConfigError when nothing is trained yet.
     """
@@ -136,7 +136,7 @@ def _scores(tagger: Path, views: list[TrainingSample]) -> F64:
 
 
 def thresholds(scores: F64, shown: F32) -> list[float]:
-    """The threshold of each tag with the best F2, recall counting more: what is not tagged is never looked for.
+    """The threshold of each tag with the best F2, which favours recall: what is not tagged is never detected.
 
     scores and shown: (views, tags); shown is 1, 0 or nan (unknown). Tags shown less than `MIN_SHOWN` times take the
     threshold that is best for all tags together.

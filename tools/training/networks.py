@@ -1,7 +1,7 @@
 """The embedded networks in PyTorch: a small backbone with a feature pyramid, and a head for each task.
 
-Blocks follow YOLOv8 (C2f, SPPF, PAN) with ReLU in place of SiLU: it costs nothing in INT8. Text meets pixels as in
-YOLO-World's contrastive head: a projected word vector times each cell's embedding.
+Blocks follow YOLOv8 (C2f, SPPF, PAN) with ReLU in place of SiLU, which costs nothing in INT8. Text is compared with
+pixels as in YOLO-World's contrastive head: a projected word vector times the embedding of each cell.
 """
 
 from __future__ import annotations
@@ -120,9 +120,9 @@ class TextHead(nn.Module):
 
 
 class ObjectNetwork(nn.Module):
-    """Detector, with a dense head beside it from which the tagger is made.
+    """Detector with a dense head, from which the tagger is made.
 
-    The dense head names the object at each stride-8 cell; it teaches the backbone from every pixel.
+    The dense head names the object at each stride-8 cell, so that the backbone learns from every pixel.
     """
 
     def __init__(self) -> None:
@@ -165,10 +165,10 @@ class DetectorExport(nn.Module):
 
 
 class TaggerNetwork(nn.Module):
-    """An ObjectNetwork without its boxes, with fixed words: logits of the whole image, RAM++ layout.
+    """An ObjectNetwork without boxes, with fixed words: logits of the whole image, RAM++ layout.
 
-    The logit of a tag joins a smooth maximum over the dense head's cells and one over the detector's anchors: together
-    they name more than either. Input is ImageNet-normalised.
+    The logit of a tag combines a smooth maximum over the cells of the dense head with one over the anchors of the
+    detector. Input is ImageNet-normalised.
     """
 
     def __init__(self, network: ObjectNetwork, text: Tensor) -> None:
@@ -191,7 +191,7 @@ class TaggerNetwork(nn.Module):
 
 
 class MaskEncoder(nn.Module):
-    """Image and depth to an embedding that is read once for all boxes of a frame."""
+    """Image and depth to an embedding that is shared by all boxes of a frame."""
 
     CHANNELS = 40
 
@@ -218,10 +218,10 @@ class MaskEncoder(nn.Module):
 
 
 class MaskDecoder(nn.Module):
-    """Embedding and boxes to one mask a box, on a grid that covers the box with a margin, and its predicted IoU."""
+    """Embedding and boxes to one mask per box, on a grid that covers the box with a margin, and its predicted IoU."""
 
     GRID = 48
-    MARGIN = 0.08  # of the box's size on each side: what lies outside tells where the object ends
+    MARGIN = 0.08  # share of the box's size added on each side as context
 
     def __init__(self) -> None:
         super().__init__()
@@ -250,7 +250,7 @@ class MaskDecoder(nn.Module):
         return self.mask(d0), torch.sigmoid(self.quality(e2.mean(dim=(2, 3))))
 
     def sample(self, embedding: Tensor, boxes: Tensor) -> Tensor:
-        """What the embedding holds at each box's grid, with depth made relative and the box drawn in."""
+        """The embedding at each box's grid, with depth made relative and the box drawn in."""
         x = boxes[:, 0:1] + (boxes[:, 2:3] - boxes[:, 0:1]) * self.line  # (N, G)
         y = boxes[:, 1:2] + (boxes[:, 3:4] - boxes[:, 1:2]) * self.line
         g = self.GRID
@@ -267,7 +267,7 @@ class MaskDecoder(nn.Module):
         relative = torch.clamp(depth - centre, -2.0, 2.0)
         inside = ((self.line >= 0) & (self.line <= 1)).to(depth.dtype)
         coarse_mask = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
-        # how large the box is tells how coarse the grid is
+        # the size of the box gives the resolution of the grid
         size = (boxes[:, 2:] - boxes[:, :2])[:, :, None, None].expand(-1, 2, g, g)
         return torch.cat((sampled[:, :-1], relative, relative * 4.0, coarse_mask, size), 1)
 

@@ -1,4 +1,4 @@
-"""Trained networks to ONNX files in the layouts that the families of models_onnx read, and those to INT8."""
+"""Exports networks to ONNX in the layouts that models_onnx reads, and quantises them to INT8."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from placegraph.runtime.arrays import F32, U8
 
 OPSET = 17  # read by onnxruntime 1.20 and later
-# convolutions and what moves their results about; the arithmetic of the last layers stays exact
+# convolutions and data movement; the arithmetic of the last layers stays float
 QUANTISED = ("Conv", "Add", "Concat", "MaxPool", "Resize", "Relu")
 
 Feeds = dict[str, NDArray[Any]]
@@ -32,7 +32,7 @@ def export_onnx(
     file: Path,
     open_axes: Mapping[str, Mapping[int, str]] | None = None,
 ) -> Path:
-    """Write `network` as a float ONNX file; `inputs` are examples by name, in order."""
+    """Writes `network` as a float ONNX file; `inputs` are examples by name, in order."""
     file.parent.mkdir(parents=True, exist_ok=True)
     network = network.float().eval().to(memory_format=torch.contiguous_format)
     torch.onnx.export(
@@ -57,10 +57,10 @@ class _FeedReader(CalibrationDataReader):
 
 
 def quantise(float_file: Path, file: Path, feeds: Iterator[Feeds], keep_float: Sequence[str] = ()) -> Path:
-    """Write `float_file` as static INT8 (QDQ, weights by channel), ranges from `feeds`.
+    """Writes `float_file` as static INT8 (QDQ, weights by channel) with ranges from `feeds`.
 
-    keep_float: patterns of the whole names of nodes that stay float. What joins numbers of different kinds (px and
-    scores, metres and features) must: one INT8 range cannot hold both.
+    keep_float: patterns of the names of nodes that stay float. Nodes that join numbers of different kinds (px and
+    scores) must, because one INT8 range cannot hold both.
     """
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"

@@ -1,8 +1,8 @@
-"""SmolLM2 as llama.cpp sees it, frozen, with a low-rank adapter on every linear layer that is trained.
+"""SmolLM2 as llama.cpp runs it, frozen, with a trainable low-rank adapter on every linear layer.
 
-Source: LoRA (Hu et al. 2021); METHOD section 10. Departs: the layers are written out here instead of taken from
-transformers and peft: sentences lie behind each other without padding, and q, k, v (gate, up) are one product; two
-cores train several times as fast so, and the weights stay in the order of the GGUF file.
+Source: LoRA (Hu et al. 2021). Not as in transformers and peft, whose layers are not used: sentences are concatenated
+without padding, and q, k, v (gate, up) are one product. This trains several times as fast on two cores, and the weights
+keep the order of the GGUF file.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from torch.nn import functional
 
 from placegraph.runtime.errors import ModelError
 
-RANK = 16  # METHOD section 10: enough for 18 of 20 requests
+RANK = 16  # a trial read 18 of 20 requests with it
 ALPHA = 32.0  # LoRA: twice the rank is the usual choice; the product is scaled by ALPHA / RANK
 # Linear layers that read the same input are computed together.
 GROUPS = (("attn_q", "attn_k", "attn_v"), ("attn_output",), ("ffn_gate", "ffn_up"), ("ffn_down",))
 
 
 class _Adapted(torch.autograd.Function):
-    """x (T, in) times frozen weight (out, in), plus the low-rank part; no gradient of the weight is computed."""
+    """x (T, in) times frozen weight (out, in) plus the low-rank part; the weight gets no gradient."""
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, a: Tensor, b: Tensor) -> Tensor:
@@ -86,7 +86,7 @@ class ReaderNetwork(nn.Module):
         )
 
     def forward(self, sentences: Sequence[Sequence[int]], predicted_at: Tensor) -> Tensor:
-        """Logits (M, vocabulary) at `wanted` (M,), positions among all tokens of all sentences laid end to end."""
+        """Logits (M, vocabulary) at positions `predicted_at` (M,) among the concatenated tokens of all sentences."""
         lengths = [len(sentence) for sentence in sentences]
         ids = torch.tensor([token for sentence in sentences for token in sentence])
         longest = max(lengths)
@@ -113,7 +113,8 @@ class ReaderNetwork(nn.Module):
     def _attend(self, qkv: Tensor, place: Tensor, shape: tuple[int, int], turn: Tensor) -> Tensor:
         """Causal attention within each sentence: (T, all heads' q, k, v) to (T, width).
 
-        place: (T,) of each token among rows of equal length, where padding only follows: nothing looks ahead at it.
+        place: (T,) position of each token among rows of equal length; padding follows the tokens, so it is never
+        attended.
         """
         rows, longest = shape
         all_heads = self.heads + 2 * self.key_heads

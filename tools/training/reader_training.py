@@ -1,6 +1,6 @@
-"""Train the adapter that makes the packaged language model read requests into programs; on generated requests only.
+"""Trains the adapter with which the packaged language model reads requests into programs, on generated requests.
 
-Source: METHOD section 10 (rank 16 on all linear layers, sentences written by a program).
+Source: LoRA of rank 16 on all linear layers, with sentences from a grammar (docs/method.md).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from placegraph.tools.training.reader_network import ReaderNetwork
 from placegraph.tools.training.request_grammar import Example, examples
 from placegraph.tools.training.training_loop import fit
 
-BATCH = 16  # sentences a step: the most of them in an hour of two cores, see README
+BATCH = 16  # sentences per step; best use of an hour on two cores
 RATE = 1e-3  # of AdamW, at its highest
 WARM_UP = 50  # steps
-CLIP = 1.0  # most norm of the gradient
+CLIP = 1.0  # largest norm of the gradient
 SAVE_EVERY = 200  # steps
 VALIDATION = 100  # held-out requests that each checkpoint is tried on
 VALIDATION_SEED = 1_000_003  # no training run has it
 
 
 class TokenBatch:
-    """Requests with their replies as tokens, and where among them the replies are predicted."""
+    """Requests with their replies as tokens, and the positions at which the replies are predicted."""
 
     def __init__(self, model: LanguageModel, requests: Sequence[Example]) -> None:
         self.tokens: list[list[int]] = []
@@ -53,10 +53,10 @@ class TokenBatch:
 def train_reader(
     out: Path, steps: int, *, model_path: Path | None = None, seed: int = 0, batch: int = BATCH, threads: int = 2
 ) -> None:
-    """Train to `steps` and write the adapter to `out`, which is there from the first checkpoint on.
+    """Trains to `steps` and writes the adapter to `out`, which exists from the first checkpoint on.
 
-    model_path: a GGUF of the family llama; None for the packaged model. Goes on from the checkpoint beside `out` where
-    there is one. Raises ConfigError for an unusable seed or file name and ModelError for an unusable model.
+    model_path: a GGUF of the llama family; None for the packaged model. Resumes from the checkpoint beside `out`.
+    Raises ConfigError for an unusable seed or file name and ModelError for an unusable model.
     """
     if seed == VALIDATION_SEED:
         raise ConfigError(f"--seed: {seed} is set aside for validation")
@@ -94,9 +94,9 @@ def train_reader(
 
 @torch.no_grad()
 def count_exact(model: LanguageModel, network: nn.Module, requests: Sequence[Example]) -> int:
-    """How many requests get their very reply token by token; greedy decoding writes just these, for it is what follows.
+    """How many requests get exactly their reply, token by token; equals what greedy decoding would write.
 
-    A program with its conditions in another order counts as wrong here, and no grammar helps.
+    A program with its conditions in another order counts as wrong, and no grammar is applied.
     """
     sentences = TokenBatch(model, requests)
     logits, targets = sentences.logits(network)

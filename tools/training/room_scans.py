@@ -1,7 +1,7 @@
-"""Maps of rooms as fusion would hold them, simulated without rendering: what a walk sees of each object, and mistakes.
+"""Simulated scans of rooms, as fusion would map them, without rendering.
 
-Source: ours. Surface points of the furniture are kept where one of a few cameras in the room sees them (facing it,
-nothing nearer in the same direction); objects are then dropped, merged, split, moved and invented at random.
+Surface points of the furniture are kept where one of a few cameras in the room sees them (facing it, unoccluded).
+Objects are then dropped, merged, split, moved and invented at random to imitate the errors of mapping.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from placegraph.runtime.arrays import F32, F64, Bool
 from placegraph.runtime.errors import SourceError
 from placegraph.tools.simulator.house_model import House, PlacedItem, Room
 
-SALT = 6_011  # keeps the scans' randomness apart from what else is drawn from a house's seed
+SALT = 6_011  # a random stream of its own
 STEP_M = 0.002  # points are stored as whole steps
 VOXEL_M = 0.025  # of the map's objects
 DENSITY_PER_M2 = 2500.0  # of the points drawn on surfaces: a voxel holds more than one
 DIRECTIONS = (160, 80)  # cells of a camera's sphere, in which the nearest surface hides what lies behind it
-THICK_M = 0.06  # what is so little behind the nearest surface of its direction is still seen
+THICK_M = 0.06  # points this little behind the nearest surface are still seen
 FAR_M = 5.0  # a depth camera's reach
 NOISE_M = 0.008
 CLEAR_M = 0.25  # from a camera to furniture in plan
-CARPET_M = 0.1  # what is no higher is walked over
+CARPET_M = 0.1  # lower items are walked over
 CAMERA_TRIALS = 200
-MIN_POINTS = 25  # fewer make no object
-PHANTOM = -2  # RoomScan.location of what is no object of the house
+MIN_POINTS = 25  # fewer points make no object
+PHANTOM = -2  # RoomScan.location of an invented object
 
 
 @dataclass(frozen=True, eq=False)
 class RoomScan:
-    """One room as it was seen: points (N, 3) of each object, metres, world frame, and the location each belongs to.
+    """One room as it was seen: points (N, 3) of each object, metres, world frame, and the location of each.
 
-    `location` counts in `outlines`, the true outlines (K, 2) of the room's locations; -1: of none.
+    `location` indexes `outlines`, the true outlines (K, 2) of the room's locations; -1: of none.
     """
 
     floor: int
@@ -50,13 +50,13 @@ class RoomScan:
 
 
 def scan_rooms(house: House, variant: int = 0) -> list[RoomScan]:
-    """Every room of a house as one walk through it sees it; another `variant` is another walk."""
+    """Every room of a house as seen by one walk; another `variant` is another walk."""
     random = np.random.default_rng([house.seed, SALT, variant])
     return [_scan_room(house, room, random) for room in house.rooms]
 
 
 def add_mapping_errors(scan: RoomScan, random: np.random.Generator, missing: float = 0.2) -> RoomScan:
-    """The same room with the mistakes of perception and mapping: a share `missing` of the objects is not found."""
+    """The room with errors of perception and mapping; a share `missing` of the objects is not found."""
     pairs = [
         (xyz, location) for xyz, location in zip(scan.objects, scan.location, strict=True) if random.random() >= missing
     ]
@@ -75,7 +75,7 @@ def add_mapping_errors(scan: RoomScan, random: np.random.Generator, missing: flo
 
 
 def join(a: RoomScan, b: RoomScan) -> RoomScan:
-    """Two rooms of one floor as one, as where the room layer found no wall between them."""
+    """Two rooms of one floor as one, as when the room layer finds no wall between them."""
     rectangle = np.concatenate(
         (np.minimum(a.rectangle[:2], b.rectangle[:2]), np.maximum(a.rectangle[2:], b.rectangle[2:]))
     )
@@ -111,9 +111,7 @@ def _scan_room(house: House, room: Room, random: np.random.Generator) -> RoomSca
 def _cameras(
     room: Room, items: list[PlacedItem], floor_m: float, random: np.random.Generator
 ) -> list[tuple[F64, float, float]]:
-    """Places (3,) in a room, beside the furniture where it leaves room, at the height of a robot's mast or a hand, with
-    the heading and half the sector that each sees, radians.
-    """
+    """Camera places (3,) beside furniture at the height of a mast or a hand, with heading and half sector in rad."""
     contour = room.polygon.astype(np.float32)
     low, high = room.polygon.min(axis=0), room.polygon.max(axis=0)
     boxes = np.array([item.box for item in items if item.box[0, 2] < floor_m + CARPET_M < item.box[1, 2]])
@@ -140,7 +138,7 @@ def _is_close_to(xy: F64, boxes: F64) -> bool:
 def _visible_points(
     items: list[PlacedItem], cameras: list[tuple[F64, float, float]], random: np.random.Generator
 ) -> list[F32]:
-    """Points (N, 3) of each item that some camera sees, one a voxel, with noise."""
+    """Points (N, 3) of each item that some camera sees, one per voxel, with noise."""
     coarse_mask = [_surface_points(item, random) for item in items]
     xyz, normal = (np.concatenate([pair[k] for pair in coarse_mask]) for k in (0, 1))
     owner = np.repeat(np.arange(len(items)), [len(pair[0]) for pair in coarse_mask])
@@ -173,7 +171,7 @@ def _surface_points(placed: PlacedItem, random: np.random.Generator) -> tuple[F6
 
 
 def _visible(xyz: F64, normal: F64, place: F64, heading: float, half_sector: float) -> Bool:
-    """(N,) which points face a camera at `place`, within its sector and reach, with nothing before them."""
+    """(N,) which points face a camera at `place` within its sector and range, unoccluded."""
     ray = xyz - place
     away = np.linalg.norm(ray, axis=1)
     azimuth = np.arctan2(ray[:, 1], ray[:, 0])
@@ -190,7 +188,7 @@ def _visible(xyz: F64, normal: F64, place: F64, heading: float, half_sector: flo
 
 
 def _merge_neighbours(pairs: list[tuple[F32, int]], random: np.random.Generator) -> list[tuple[F32, int]]:
-    """Some objects take in their nearest neighbour when it is close."""
+    """Some objects absorb their nearest neighbour when it is close."""
     pairs = list(pairs)
     k = 0
     while k < len(pairs):
@@ -215,7 +213,7 @@ def _merge_neighbours(pairs: list[tuple[F32, int]], random: np.random.Generator)
 
 
 def _cut_in_two(xyz: F32, share: float, random: np.random.Generator) -> tuple[F32, F32]:
-    """An object cut by an upright plane: the larger part, and the part with so large a share of the points."""
+    """An object cut by a vertical plane: the larger part, and the part with `share` of the points."""
     angle = random.uniform(0, 2 * np.pi)
     along = xyz[:, :2] @ np.array([np.cos(angle), np.sin(angle)], np.float32)
     low = along < np.quantile(along, share)
@@ -223,7 +221,7 @@ def _cut_in_two(xyz: F32, share: float, random: np.random.Generator) -> tuple[F3
 
 
 def _phantom_object(scan: RoomScan, random: np.random.Generator) -> F32:
-    """A box of points somewhere in the room: a piece of wall, or of what was already cleared away."""
+    """A box of points somewhere in the room, like a piece of wall or a removed object."""
     size = random.uniform(0.1, 0.6, 3)
     x, y = random.uniform(scan.rectangle[:2], scan.rectangle[2:])
     low = np.array([x, y, scan.low_m + random.choice([0.0, 0.8, 1.4])]) - size * (0.5, 0.5, 0)

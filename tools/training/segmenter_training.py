@@ -1,4 +1,4 @@
-"""Train the segmenter: image and depth once a frame, then a mask for each box that is asked for."""
+"""Trains the segmenter: image and depth are encoded once per frame, then a mask is decoded for each box."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from placegraph.tools.training.networks import MaskDecoder, MaskEncoder
 
 SIZE = (320, 416)  # height, width in px
 BATCH = 4
-BOXES = 8  # of an image and step
+BOXES = 8  # per image and step
 RATE = 2e-3
 BOX_JITTER = 0.06  # sigma of each side by the box's size: a detector's boxes are not exact
 NO_DEPTH = 0.1  # share of images shown without depth: a camera may have none
@@ -40,7 +40,7 @@ class MaskNetwork(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class BoxPrompts:
-    """Boxes asked for in a batch: (M, 4) shares of each image, and the true masks (N, 1, G, G) on their grids."""
+    """Boxes of a batch: (M, 4) as shares of each image, and the true masks (N, 1, G, G) on their grids."""
 
     boxes: list[Tensor]
     masks: Tensor
@@ -49,7 +49,7 @@ class BoxPrompts:
 def draw_box_prompts(
     samples: list[TrainingSample], line: np.ndarray[tuple[int], np.dtype[np.float32]], random: np.random.Generator
 ) -> BoxPrompts:
-    """Draw boxes of things that count, a little off; line (G,) are the grid's positions by the box."""
+    """Draws boxes of objects that count, slightly inexact; line (G,) are the grid's positions relative to the box."""
     boxes, masks = [], []
     for sample in samples:
         height, width = sample.instance.shape
@@ -88,7 +88,7 @@ def mask_losses(logits: Tensor, quality: Tensor, masks: Tensor, inside: Tensor) 
 
 
 def train_masks(data: Path, checkpoint: Path, steps: int, seed: int = 2, threads: int = 2) -> MaskNetwork:
-    """Train on the shards of `data`, going on from `checkpoint`; returns the averaged network."""
+    """Trains on the shards of `data`, resuming from `checkpoint`; returns the averaged network."""
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
     network = MaskNetwork().to(memory_format=torch.channels_last)

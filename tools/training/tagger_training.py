@@ -1,4 +1,4 @@
-"""Train the tagger: the backbone and dense head of a trained ObjectNetwork, tuned to whole, squashed images."""
+"""Trains the tagger: a trained ObjectNetwork tuned to whole, squashed images."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RATE = 3e-4
 
 
 def tag_targets(samples: list[TrainingSample]) -> Tensor:
-    """(B, T): 1 shown, 0 not, nan where the only sight of a thing is too small or cut off."""
+    """(B, T): 1 shown, 0 not, nan where the only visible object of the class is too small or cut off."""
     tags = np.zeros((len(samples), len(NAMES)), np.float32)
     for k, sample in enumerate(samples):
         tags[k, sample.classes[~sample.counts]] = np.nan
@@ -34,7 +34,7 @@ def tag_targets(samples: list[TrainingSample]) -> Tensor:
 def train_tagger(
     data: Path, objects: ObjectNetwork, checkpoint: Path, steps: int, seed: int = 3, threads: int = 2
 ) -> TaggerNetwork:
-    """Tune on the shards of `data`, going on from `checkpoint`; returns the averaged network."""
+    """Trains on the shards of `data`, resuming from `checkpoint`; returns the averaged network."""
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
     text = torch.from_numpy(TextEncoder().encode(NAMES))

@@ -1,4 +1,4 @@
-"""The training loop: AdamW, warm-up and cosine, an average of the weights, checkpoints that survive a stop."""
+"""The training loop: AdamW, warm-up and cosine schedule, averaged weights, checkpoints."""
 
 from __future__ import annotations
 
@@ -34,10 +34,11 @@ def fit(
     save_every: int = 250,
     at_save: Callable[[int, nn.Module], None] | None = None,
 ) -> Any:
-    """Train to `steps`, going on from `checkpoint` where there is one; returns the network of averaged weights.
+    """Trains to `steps`, resuming from `checkpoint`; returns the network of averaged weights.
 
-    step(i) computes the losses of step i, in bfloat16 where that is safe; equal seeds and data give the same course.
-    clip: most norm of the gradient. at_save(steps done, network of averaged weights) is called after each checkpoint.
+    step(i) computes the losses of step i, in bfloat16 where that is safe; equal seeds and data give equal results.
+    clip: largest norm of the gradient. at_save(steps done, network of averaged weights) is called after each
+    checkpoint.
     """
     optimizer = torch.optim.AdamW(_parameter_groups(network, weight_decay), lr=rate, betas=(0.9, 0.99))
     average = copy.deepcopy(network).eval()
@@ -71,7 +72,7 @@ def fit(
 
 
 def read_average(checkpoint: Path, network: Network) -> Network:
-    """Load the averaged weights of a checkpoint into a network of the same kind; raises ConfigError when absent."""
+    """Loads the averaged weights of a checkpoint into a network of the same kind; raises ConfigError when absent."""
     if not checkpoint.exists():
         raise ConfigError(f"{checkpoint}: not there; an earlier step of `placegraph train` writes it")
     network.load_state_dict(torch.load(checkpoint, weights_only=True)["average"])
@@ -79,7 +80,7 @@ def read_average(checkpoint: Path, network: Network) -> Network:
 
 
 def _parameter_groups(network: nn.Module, decay: float) -> list[dict[str, Any]]:
-    """Weights decay; biases, norms and scales do not."""
+    """Weight decay applies to weights, not to biases, norms and scales."""
     shrink = [p for p in network.parameters() if p.requires_grad and p.ndim > 1]
     keep = [p for p in network.parameters() if p.requires_grad and p.ndim <= 1]
     return [{"params": shrink, "weight_decay": decay}, {"params": keep, "weight_decay": 0.0}]

@@ -1,9 +1,8 @@
-"""Training data: views of many houses, rendered once and kept as plain arrays, a folder (shard) a house.
+"""Renders training views of many houses and stores them as arrays, one folder (shard) per house.
 
-A shard holds color.npy (K, H, W, 3) uint8 as a camera gives it, depth.npy (K, H, W) uint16 mm, instance.npy (K, H, W)
-uint16 (item id + 1, 0: the building), item_class.npy (items,) uint8, an index into NAMES, and boxes.npy (M, 8): view,
-item, class, x0 y0 x1 y1 (exclusive) and visible px. Views stand where a robot could, with heights and pitches varied
-beyond its walk.
+A shard holds color.npy (K, H, W, 3) uint8, depth.npy (K, H, W) uint16 mm, instance.npy (K, H, W) uint16 (item id + 1,
+0: the building), item_class.npy (items,) uint8, an index into NAMES, and boxes.npy (M, 8): view, item, class, x0 y0 x1
+y1 (exclusive) and visible px. Views are at robot positions, with heights and pitches varied beyond its trajectory.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from placegraph.tools.simulator.object_classes import NAMES
 from placegraph.tools.simulator.occupancy_grid import free_grid
 
 WIDTH, HEIGHT = 640, 480
-EVALUATION_SEEDS = range(9000, 10000)  # never trained on; `placegraph house` of such a seed is a test
+EVALUATION_SEEDS = range(9000, 10000)  # never used in training
 CALIBRATION_SEEDS = range(10000, 10100)  # for INT8 ranges and thresholds
 TRAINING_SEEDS = range(20000, 30000)
 SALT = 77
@@ -36,7 +35,7 @@ CELL_M = 0.05
 
 
 def render_house(seed: int, views: int, folder: Path) -> Path:
-    """Render `views` views of one house into `folder`/SEED; does nothing when it is there."""
+    """Renders `views` views of one house into `folder`/SEED, unless it exists."""
     shard = folder / str(seed)
     if shard.exists():
         return shard
@@ -135,7 +134,7 @@ def _room_of(house: House, eye: F64) -> int:
 
 
 def _facing(pose: F64, middles: F64, near: Bool) -> int:
-    """How many middles of the camera's own room lie well inside the picture, .7 to 5 m away."""
+    """How many items of the camera's room are well inside the image, .7 to 5 m away."""
     x, y, z = ((middles - pose[:3, 3]) @ pose[:3, :3]).T
     inside = (np.abs(x) < 0.6 * z) & (np.abs(y) < 0.45 * z) & (z > 0.7) & (z < 5.0)
     return int((inside & near).sum())

@@ -1,4 +1,4 @@
-"""Words to where words and pixels meet: as they are trained, and as they are packed."""
+"""Projection of word vectors into the embedding that words share with pixels: as trained, and as packaged."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ OTHER_WORDS = (
     "flag", "hat",
 )  # fmt: skip  # never shown: the network must also say no
 KNOWN_WORDS = (*(word for object_class in CLASSES for word in object_class.training_words), *OTHER_WORDS)
-# how much more a nearer word counts. On houses kept aside AP50 by unsaid synonyms was .36 with Words alone, and .47,
+# Weight of similarity. On held-out houses AP50 by held-out synonyms was .36 with WordProjection alone, and .47,
 # .51, .51, .51 with a sharpness of 15, 25, 40, 80; by names it rose as well
 SHARPNESS = 25.0
 
 
 class WordProjection(nn.Module):
-    """WordLlama vectors to the space where words and pixels meet; starts close to a plain projection."""
+    """WordLlama vectors to the shared embedding; starts close to a linear projection."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -35,10 +35,10 @@ class WordProjection(nn.Module):
 
 
 class WordTable(nn.Module):
-    """A meaning for each word of the training, begun from a trained `Words`; any other word is a mean of those near it.
+    """One embedding per training word, initialised from a trained WordProjection; other words are interpolated.
 
-    Between the few words that it was trained with, what `Words` learnt means little, while the distances of WordLlama's
-    own vectors still tell what a word is like: a kernel regression (Nadaraya 1964, Watson 1964), as attention.
+    Between the few training words the projection is unreliable, while distances between WordLlama vectors still measure
+    similarity: a kernel regression (Nadaraya 1964, Watson 1964), written as attention.
     """
 
     def __init__(self, words: WordProjection, known: Tensor) -> None:

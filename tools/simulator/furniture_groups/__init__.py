@@ -1,1 +1,1 @@
-"""Groups of furniture that is used together, each drafted in a frame of its own before it finds its place in a room."""
+"""Groups of furniture that are used together, each laid out in its own frame before it is placed in a room."""

@@ -1,4 +1,4 @@
-"""Groups of bedrooms, offices and hallways: sleeping, storage, work, entrance; each gives drafts, fullest first."""
+"""Furniture groups of bedrooms, offices and hallways. Each function yields layouts, the most complete one first."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from placegraph.tools.simulator.house_model import ON_WALL
 
 
 def sleeping_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A bed, its head at the wall, nightstands with lamps beside it, a rug under its foot."""
+    """A bed with its head at the wall, nightstands with lamps, and a rug under its foot."""
     widths = ((1.6, 2), (1.4, 1), (0.9, 1)) if area_m2 > 11 else ((1.2, 1), (0.9, 1), (0.9, 0))
     for bed_width, stands in widths:
         layout = GroupLayout("sleeping area", random)
@@ -48,7 +48,7 @@ def storage_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupL
 
 
 def cupboard_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A cabinet beside a bookshelf or another cabinet, for rooms where nobody dresses."""
+    """A cabinet beside a bookshelf or dresser, for rooms that are no bedrooms."""
     side = float(random.choice([-1, 1]))
     for width in (1.2, 0.8):
         layout = GroupLayout("storage area", random)
@@ -60,7 +60,7 @@ def cupboard_area(random: np.random.Generator, area_m2: float) -> Iterator[Group
 
 
 def work_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A desk with its chair, a computer on it, a printer or a trash can beside it."""
+    """A desk with its chair and a computer, a printer or a trash can beside it."""
     side = float(random.choice([-1, 1]))
     for width in (1.5, 1.2, 0.95):
         if width > 1.3 and area_m2 < 12:
@@ -102,7 +102,7 @@ def _place_computer(layout: GroupLayout, desk: int, width_m: float, side: float)
 
 
 def entrance_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A shoe rack, a coat rack and a bench in a row, a mirror above the rack."""
+    """A shoe rack, a coat rack and a bench in a row, with a mirror above the rack."""
     for names in (("shoe rack", "coat rack", "bench"), ("coat rack", "shoe rack"), ("coat rack", "bench")):
         layout, x = GroupLayout("entrance area", random), 0.0
         for name in random.permutation(names).tolist():

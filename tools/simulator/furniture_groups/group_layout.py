@@ -1,6 +1,6 @@
-"""A group of things in its own frame: the wall behind it is y = 0, the group lies before it, z = 0 is the floor.
+"""A furniture group in its own frame: the wall behind it is y = 0, the group lies at y < 0, z = 0 is the floor.
 
-A group that stands free has its middle at the origin. All in metres and radians.
+A group that stands free has its middle at the origin. Metres and radians.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from placegraph.runtime.arrays import F64, Bool
 from placegraph.tools.simulator.catalogue import design
 from placegraph.tools.simulator.house_model import ON_FLOOR, Item, SupportSurface
 
-WALL_GAP_M = 0.04  # between a back and the wall: room for the baseboard
-EDGE_M = 0.01  # a thing keeps this far from the edge of what it stands on
+WALL_GAP_M = 0.04  # between furniture and wall, for the baseboard
+EDGE_M = 0.01  # smallest distance of an item to the edge of its support
 
 
 @dataclass(frozen=True, eq=False)
 class LayoutPiece:
-    """One item at its place in the group's frame; `on` is the index of the piece it stands on, or ON_FLOOR, ON_WALL."""
+    """One item in the frame of the group; `on` is the index of the piece it stands on, or ON_FLOOR, ON_WALL."""
 
     item: Item
     x: float
@@ -37,7 +37,7 @@ class LayoutPiece:
 
 @dataclass(eq=False)
 class GroupLayout:
-    """A group while it is put together; `kind` is "" for a thing on its own."""
+    """A group while it is put together; `kind` is "" for a single item."""
 
     kind: str
     random: np.random.Generator
@@ -49,18 +49,18 @@ class GroupLayout:
         return design(name, self.random, **sizes_m)
 
     def place_free(self, item: Item, x: float, y: float, yaw: float = 0.0, on: int = ON_FLOOR, z: float = 0.0) -> int:
-        """Put an item at a place; gives its index."""
+        """Puts an item at (x, y); returns its index."""
         self.pieces.append(LayoutPiece(item, float(x), float(y), float(z), float(yaw), on))
         return len(self.pieces) - 1
 
     def place_at_wall(self, item: Item, x: float) -> int:
-        """Stand an item with its back to the wall, its middle at x."""
+        """Puts an item with its back to the wall, its middle at x; returns its index."""
         return self.place_free(item, x, -WALL_GAP_M - item.extent[1, 1])
 
     def place_on(
         self, carrier: int, item: Item, x: float, y: float, yaw: float = 0.0, board: int | None = None
     ) -> bool:
-        """Put an item on a piece at (x, y) of the piece's frame, moved onto its surface; False where it has no room."""
+        """Puts an item on a piece at (x, y) of the piece's frame, shifted onto its surface; False without space."""
         boards = self.pieces[carrier].item.surfaces
         if not boards:
             return False
@@ -81,7 +81,7 @@ class GroupLayout:
         return True
 
     def scatter_on(self, carrier: int, item: Item, boards: Sequence[int] | None = None, turn: float = 0.3) -> bool:
-        """Put an item somewhere on a piece, at random and turned by up to `turn`; False where it found no room."""
+        """Puts an item on a piece at random, turned by up to `turn`; False without space."""
         surfaces = self.pieces[carrier].item.surfaces
         for board in self.random.permutation(range(len(surfaces)) if boards is None else boards)[:4].tolist():
             surface = surfaces[board]
@@ -92,7 +92,7 @@ class GroupLayout:
         return False
 
     def _is_occupied(self, carrier: int, board: SupportSurface, footprint: F64) -> bool:
-        """Whether something stands on the board where the rectangle (4,) of the carrier's frame is wanted."""
+        """Whether something on the surface overlaps a footprint (4,) of the carrier's frame."""
         base = self.pieces[carrier]
         c, s = np.cos(base.yaw), np.sin(base.yaw)
         for piece in self.pieces:
@@ -121,7 +121,7 @@ def rectangles_overlap(rectangles: F64, others: F64, gap_m: float = 0.0) -> Bool
 
 
 def nearest_fit(board: SupportSurface, item: Item, x: float, y: float, yaw: float) -> tuple[float, float] | None:
-    """The place nearest to (x, y) where an item is wholly on a board, carrier's frame, or None when it is too big."""
+    """The position nearest to (x, y) where an item is entirely on a surface, carrier's frame; None when too big."""
     x0, y0, x1, y1 = footprint_rectangle(item, 0.0, 0.0, yaw)
     low = np.array([board.x0 - x0, board.y0 - y0]) + EDGE_M
     high = np.array([board.x1 - x1, board.y1 - y1]) - EDGE_M

@@ -1,4 +1,4 @@
-"""Groups of kitchens, bathrooms and laundries: cooking, washing, bathing, laundry; each gives drafts, fullest first."""
+"""Furniture groups of kitchens, bathrooms and laundries. Each function yields layouts, the most complete one first."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ APPLIANCES = ("microwave", "kettle", "toaster", "coffee machine")
 
 
 def cooking_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A kitchen run along a wall: refrigerator, counters, sink, stove, with appliances on the counters."""
+    """A kitchen run along a wall: refrigerator, counters, sink and stove, with appliances on the counters."""
     order = random.permutation(2).tolist()
     hand = float(random.choice([-1, 1]))
     sizes = ((1.2, 1.2), (0.9, 0.9), (0.9, 0.6), (0.6, 0.4), (0.6, 0.0), (0.4, 0.0))
     for first, second, mirrored in ((*size, side * hand) for size in sizes for side in (1, -1)):
         layout, x = GroupLayout("cooking area", random), 0.0
-        basin = layout.design("sink", width_m=0.8 if second else 0.6, depth_m=0.6, height_m=1.13)  # the tap counts
+        basin = layout.design(
+            "sink", width_m=0.8 if second else 0.6, depth_m=0.6, height_m=1.13
+        )  # the height includes the tap
         stove = layout.design("stove", width_m=0.6, **COUNTER_M)
         items = [
             layout.design("refrigerator", depth_m=0.62, width_m=None if second else 0.6),
@@ -71,7 +73,7 @@ def washing_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupL
 
 
 def bathing_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A bathtub along a wall or a shower, with a rug before it."""
+    """A bathtub along a wall or a shower, with a rug in front of it."""
     names = ("bathtub", "shower") if random.random() < 0.55 and area_m2 > 4.5 else ("shower",)
     for name in names:
         for depth in (float(random.uniform(0.5, 0.6)), 0.42):
@@ -85,7 +87,7 @@ def bathing_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupL
 
 
 def laundry_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A washing machine, a laundry basket and an ironing board in a row along a wall; at least the machine."""
+    """A washing machine, a laundry basket and an ironing board along a wall; at least the machine."""
     side = float(random.choice([-1, 1]))
     for board_yaw in (*random.permutation([0.0, np.pi / 2]).tolist(), None):  # along the wall, across, none
         layout = GroupLayout("laundry area", random)

@@ -1,4 +1,4 @@
-"""Groups of living and dining rooms: seating, media, reading, music, dining, play; each gives drafts, fullest first."""
+"""Furniture groups of living and dining rooms. Each function yields layouts, the most complete one first."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from placegraph.tools.simulator.furniture_groups.group_layout import WALL_GAP_M, GroupLayout
 from placegraph.tools.simulator.house_model import Item
 
-FACING_WALL, FACING_RIGHT, FACING_LEFT = np.pi, np.pi / 2, -np.pi / 2  # yaw of an item that looks that way
+FACING_WALL, FACING_RIGHT, FACING_LEFT = np.pi, np.pi / 2, -np.pi / 2  # yaw of an item that faces this way
 REACH_M = 0.3  # from a seat to the table before it
 
 
@@ -20,7 +20,7 @@ def item_size(item: Item) -> tuple[float, float, float]:
 
 
 def seating_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A sofa at a wall, a coffee table before it on a rug, armchairs at its ends, a lamp and a plant beside it."""
+    """A sofa at a wall, a coffee table on a rug, armchairs at its ends, a lamp and a plant beside it."""
     for armchairs in (2, 1, 0) if area_m2 > 20 else (1, 0):
         layout = GroupLayout("seating area", random)
         sofa = layout.design("sofa", width_m=float(random.uniform(1.5, 2.2)) if area_m2 > 14 else 1.4)
@@ -56,7 +56,7 @@ def _place_beside_sofa(layout: GroupLayout, half_width_m: float, random: np.rand
 
 
 def media_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A low cabinet with a television on it and speakers on it or beside it."""
+    """A low cabinet with a television, and speakers on it or beside it."""
     for wide, min_width in ((True, 1.4), (False, 1.0), (False, 0.8)) if area_m2 > 14 else ((False, 1.0), (False, 0.8)):
         layout = GroupLayout("media area", random)
         width = min_width + float(random.uniform(0.0, 0.4 if wide else 0.2))
@@ -100,7 +100,7 @@ def reading_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupL
 
 
 def music_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A piano with its stool, a guitar beside it; where there is no room for a piano a guitar and a stool."""
+    """A piano with its stool and a guitar; without space for a piano, a guitar and a stool."""
     side = float(random.choice([-1, 1]))
     for full in (True, False):
         layout = GroupLayout("music area", random)
@@ -121,7 +121,7 @@ def music_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLay
 
 
 def dining_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A table with chairs drawn up to it: free in the room, or with one end at a wall where there is less of it."""
+    """A table with chairs: free in the room, or with one side at a wall where there is less space."""
     lengths = (float(random.uniform(1.5, 2.0)), 1.3, 0.9) if area_m2 > 13 else (1.2, 0.9)
     for length in lengths:
         yield _table_with_chairs(random, length, float(random.uniform(0.8, 0.95)), False)
@@ -133,7 +133,7 @@ def _table_with_chairs(random: np.random.Generator, length_m: float, depth_m: fl
     layout = GroupLayout("dining area", random, backed=at_wall)
     table, chairs = layout.design("table", width_m=length_m, depth_m=depth_m), [layout.design("chair")] * 2
     if random.random() < 0.25:
-        chairs[1] = layout.design("chair")  # the ends have another kind than the long sides
+        chairs[1] = layout.design("chair")  # chairs at the ends differ
     width, depth, _ = item_size(table)
     top = -WALL_GAP_M - depth / 2 if at_wall else 0.0
     layout.place_free(table, 0, top)
@@ -145,7 +145,7 @@ def _table_with_chairs(random: np.random.Generator, length_m: float, depth_m: fl
             layout.place_free(
                 chairs[0], x, top + side * away, (FACING_WALL if side < 0 else 0.0) + random.uniform(-0.08, 0.08)
             )
-    # The ends' chairs stop where those of the long sides, a little turned, begin.
+    # Chairs at the ends keep clear of those at the long sides.
     outermost = (count - 1) / 2 * width / count + item_size(chairs[0])[0] / 2 + 0.06
     for side in (-1, 1):
         if at_wall or random.random() < (0.5 if length_m < 1.8 else 0.75):
@@ -156,7 +156,7 @@ def _table_with_chairs(random: np.random.Generator, length_m: float, depth_m: fl
 
 
 def play_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """Toys along a wall: boxes, a teddy bear, balls, cushions; two rows where the room is large."""
+    """Toys along a wall: boxes, a teddy bear, balls, cushions; two rows in a large room."""
     for rows in (2, 1) if area_m2 > 9 and random.random() < 0.4 else (1,):
         layout = GroupLayout("play area", random)
         for row in range(rows):
@@ -169,7 +169,7 @@ def play_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayo
             for name in random.permutation(names).tolist():
                 item = layout.design(name)
                 width, depth, _ = item_size(item)
-                reach = float(np.hypot(width, depth)) / 2  # whichever way it is turned
+                reach = float(np.hypot(width, depth)) / 2  # for any yaw
                 x += reach + 0.04
                 layout.place_free(
                     item, x, -WALL_GAP_M - 0.3 - 0.62 * row, random.uniform(-0.4, 0.4) if width < 0.55 else 0.0

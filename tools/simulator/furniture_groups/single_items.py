@@ -1,4 +1,4 @@
-"""Things that stand on their own, in corners and along walls: plants, trash cans, suitcases, a bicycle, the toilet."""
+"""Single items in corners and along walls: plants, trash cans, suitcases, a bicycle, the toilet."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def toilet(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]
 
 
 def bicycle(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayout]:
-    """A bicycle along the wall, brought in while there is room for it."""
+    """A bicycle along the wall, placed before the furniture takes the space."""
     layout = GroupLayout("", random)
     layout.place_at_wall(layout.design("bicycle"), 0)
     yield layout
 
 
 def draw_single_items(room_type: str, area_m2: float, random: np.random.Generator) -> Iterator[GroupLayout]:
-    """Things for the corners of a room of a type, fewer where it is small."""
+    """Random single items for a room of a type, fewer where it is small."""
     for name, chance in SINGLE_ITEMS.get(room_type, DEFAULT_ITEMS):
         if random.random() < chance * min(1.0, 0.5 + area_m2 / 20):
             layout = GroupLayout("", random)
@@ -63,7 +63,7 @@ def draw_single_items(room_type: str, area_m2: float, random: np.random.Generato
 
 
 def _floor_item(layout: GroupLayout, name: str) -> Item:
-    """A design in a size that stands on the floor."""
+    """An item of a class in a size that stands on the floor."""
     heights = {"potted plant": (0.5, 1.4), "lamp": (1.35, 1.7), "box": (0.25, 0.45), "teddy bear": (0.35, 0.6)}
     if name not in heights:
         return layout.design(name)

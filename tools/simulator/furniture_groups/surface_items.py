@@ -1,13 +1,13 @@
-"""Small things for the surfaces of furniture: what usually stands on what, and how often."""
+"""Small items on furniture: what usually stands on what, and how often."""
 
 from __future__ import annotations
 
 from placegraph.tools.simulator.furniture_groups.group_layout import GroupLayout
 from placegraph.tools.simulator.house_model import Item
 
-HIGHEST_M = 2.1  # nothing stands higher than a wardrobe
+HIGHEST_M = 2.1  # highest surface that gets items, a wardrobe's
 
-# What may stand on a piece: class, chance, how many tries of that chance.
+# What may be on a piece: class, probability, number of draws.
 SURFACE_ITEMS: dict[str, tuple[tuple[str, float, int], ...]] = {
     "table": (("bowl", 0.35, 1), ("vase", 0.28, 1), ("cup", 0.35, 3), ("bottle", 0.35, 1), ("book", 0.14, 1)),
     "coffee table": (("book", 0.42, 1), ("cup", 0.35, 2), ("bowl", 0.21, 1), ("vase", 0.17, 1)),
@@ -27,7 +27,7 @@ SURFACE_ITEMS: dict[str, tuple[tuple[str, float, int], ...]] = {
     "piano": (("vase", 0.21, 1), ("book", 0.35, 1), ("lamp", 0.21, 1)),
     "refrigerator": (("box", 0.14, 1), ("potted plant", 0.1, 1)),
 }
-SMALL_HEIGHTS_M: dict[str, tuple[float, float]] = {  # heights asked for where a class also comes in sizes for the floor
+SMALL_HEIGHTS_M: dict[str, tuple[float, float]] = {  # heights of classes that also come in sizes for the floor
     "potted plant": (0.22, 0.34), "lamp": (0.34, 0.48), "box": (0.12, 0.24), "teddy bear": (0.2, 0.32),
     "vase": (0.16, 0.3),
 }  # fmt: skip
@@ -42,7 +42,7 @@ def small_item(layout: GroupLayout, name: str) -> Item:
 
 
 def add_small_items(layout: GroupLayout) -> None:
-    """Strew small things on all furniture of a group that has surfaces for them."""
+    """Scatters small items on all furniture of a group that has surfaces for them."""
     for index, piece in enumerate(list(layout.pieces)):
         boards = piece.item.surfaces
         low = [k for k, surface in enumerate(boards) if piece.z + surface.z < HIGHEST_M]

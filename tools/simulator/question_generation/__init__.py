@@ -1,1 +1,1 @@
-"""How people ask for things in a house: words, places, relations and the questions that have one right answer."""
+"""Generates questions about a house that have exactly one right answer, with their text and program."""

@@ -1,4 +1,4 @@
-"""Where a person may stand in a room and ask: free places, and what is left, right, in front and behind from there."""
+"""Free positions from which a person may ask, and the relations left, right, front and behind seen from there."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from placegraph.tools.simulator.question_generation.box_relations import Ternary
 from placegraph.tools.simulator.question_generation.item_table import ItemTable
 
 EYE_M = 1.5  # above the floor
-POSITIONS_PER_ROOM = 3  # tried in a room
-MIN_VIEW_M, MAX_VIEW_M = 0.8, 6.0  # from a standpoint to what is looked at
-CLEAR_M, NOT_BEYOND_M = 0.35, 0.15  # YES from the one on, NO beyond the other on the far side
-MAX_CROSS_RATIO = 0.8  # largest share of sideways in forward, or forward in sideways
+POSITIONS_PER_ROOM = 3  # random positions per room
+MIN_VIEW_M, MAX_VIEW_M = 0.8, 6.0  # distance range from the eyes to the anchor
+CLEAR_M, NOT_BEYOND_M = 0.35, 0.15  # YES above the first, NO below minus the second
+MAX_CROSS_RATIO = 0.8  # largest ratio of the other axis to the main one
 VIEWS = ("left", "right", "front", "behind")
 
 
 @dataclass(frozen=True, eq=False)
 class AskerPosition:
-    """A place (3,) of eyes in a room; `door` is the word for the room's only way in where it is there, else empty."""
+    """Eye position (3,) in a room; `door` is the word for the room's only entrance when it is there, else empty."""
 
     eye: F64
     door: str = ""
 
 
 def asker_positions(house: House, random: np.random.Generator) -> dict[int, tuple[AskerPosition, ...]]:
-    """Free places to ask from, by room id: the way in first where there is only one, then some others at random."""
+    """Eye positions by room id: the entrance first where there is only one, then some at random."""
     positions: dict[int, tuple[AskerPosition, ...]] = {}
     for floor in house.floors:
         origin, free = free_grid(house, floor.index)
@@ -55,7 +55,7 @@ def asker_positions(house: House, random: np.random.Generator) -> dict[int, tupl
 
 
 def _entrance(house: House, room: Room, places: F64) -> AskerPosition | None:
-    """The free place (2,) of a room's only door or archway; None where there are several ways in, or it is blocked."""
+    """The free place (2,) at a room's only door or archway; None when there are several, or it is blocked."""
     floor = house.floors[room.floor]
     ways: list[tuple[Wall, WallOpening]] = [
         (wall, opening)
@@ -75,14 +75,14 @@ def _entrance(house: House, room: Room, places: F64) -> AskerPosition | None:
 
 
 def in_sight(room: Room, eye: F64, point: F64) -> bool:
-    """Whether the straight way between two points (2+,) stays in the room's polygon, up to its last 0.2 m."""
+    """Whether the segment between two points (2+,) stays in the room's polygon, up to its last 0.2 m."""
     length = float(np.linalg.norm(point[:2] - eye[:2]))
     shares = np.linspace(0, max(1 - 0.2 / max(length, 0.2), 0.0), 25)[:, None]
     return bool(points_in_polygon(room.polygon, eye[:2] * (1 - shares) + point[:2] * shares).all())
 
 
 def view_relations(table: ItemTable, eye: F64, anchor: int) -> dict[str, TernaryArray]:
-    """(N,) answers of left, right, front and behind for one who looks at an anchor of the same room (METHOD.md 9)."""
+    """(N,) left, right, front and behind of an anchor in the same room, for a viewer who looks at it."""
     forward = table.center[anchor, :2] - eye[:2]
     forward = forward / np.linalg.norm(forward)
     leftward = np.array([-forward[1], forward[0]])  # z x f
@@ -90,7 +90,7 @@ def view_relations(table: ItemTable, eye: F64, anchor: int) -> dict[str, Ternary
     left, ahead = offset @ leftward, offset @ forward
     comparable = table.same_room[:, anchor].copy()
     comparable[anchor] = False
-    # nobody says so of a lamp on the ceiling, or of a clock far above a bench
+    # not used for ceiling lamps, or for a clock far above a bench
     level = (table.axis_gap[:, anchor, 2] < 0.3) & (table.support != ON_CEILING)
     answers = {}
     for view, main, cross in (
@@ -104,7 +104,7 @@ def view_relations(table: ItemTable, eye: F64, anchor: int) -> dict[str, Ternary
 
 
 def order_from_left(table: ItemTable, eye: F64, ids: list[int]) -> list[int] | None:
-    """The items from left to right as seen from a place that looks at their middle; None where that may be disputed."""
+    """The items from left to right for a viewer who looks at their middle; None where it is ambiguous."""
     offsets = table.center[ids, :2] - eye[:2]
     away = np.linalg.norm(offsets, axis=1)
     if (away < MIN_VIEW_M).any() or (away > 8.0).any():

@@ -1,4 +1,4 @@
-"""Requests by a place or by a thing itself: unique, floor, room, location, size, height and colour."""
+"""Questions by place or by attribute: unique, floor, room, location, size, height and colour."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ SIZE_RATIO, SIZE_M = 1.4, 1.12  # of volumes and of longest extents
 HEIGHT_RATIO, HEIGHT_LEAD_M = 1.15, 0.1
 LEVEL_LEAD_M = 0.25
 ROOM_WIDE_LOCATIONS = ("cooking area", "bathing area", "washing area", "laundry area", "sleeping area", "entrance area")
-NEAR_LOCATION_M = 1.2  # around a location's outline: what stands there may be taken for a part of it
-# Colours that people and lamps' light take for each other.
+NEAR_LOCATION_M = 1.2  # items this near to an outline may count as part of the location
+# Colours that are confused by people or under lamp light.
 SIMILAR_COLORS: tuple[tuple[str, ...], ...] = (
     ("white", "beige", "gray"), ("beige", "light brown", "yellow", "orange"), ("light brown", "brown", "orange"),
     ("gray", "black"), ("black", "brown"), ("red", "orange", "pink", "brown"), ("orange", "yellow"),
@@ -28,11 +28,11 @@ SIMILAR_COLORS: tuple[tuple[str, ...], ...] = (
 )  # fmt: skip
 
 
-NO_COLOR = ("window", "mirror")  # their colour is that of a thin frame
+NO_COLOR = ("window", "mirror")  # only their thin frame has a colour
 
 
 def attribute_questions(table: ItemTable, search_scopes: tuple[SearchScope, ...]) -> Iterator[QuestionSpec]:
-    """Requests of the forms unique, floor, room, superlative, size and color."""
+    """Questions of the forms unique, floor, room, superlative, size and color."""
     for scope in search_scopes:
         for item_id in np.flatnonzero(table.can_be_target & scope.mask).tolist():
             for name_group in table.name_groups[item_id]:
@@ -49,7 +49,7 @@ def attribute_questions(table: ItemTable, search_scopes: tuple[SearchScope, ...]
 
 
 def may_be_confused(first: str, second: str) -> bool:
-    """Whether one of two colour words may be said for the other; no word may be any."""
+    """Whether people may use one colour word for the other; an empty word may be any colour."""
     return (
         not first
         or not second
@@ -87,7 +87,7 @@ def _by_measure(
     if tall[mention.id] >= max(tall[peer_ids].max() * HEIGHT_RATIO, tall[peer_ids].max() + HEIGHT_LEAD_M):
         yield QuestionSpec("superlative", mention, scope, "tallest")
     if scope.kind == "house":
-        return  # the highest of all floors may be the lowest on its own
+        return  # heights on different floors are not compared
     if (table.low[mention.id, 2] >= table.low[peer_ids, 2] + LEVEL_LEAD_M).all() and (
         table.high[mention.id, 2] >= table.high[peer_ids, 2] + LEVEL_LEAD_M
     ).all():
@@ -99,7 +99,7 @@ def _by_measure(
 
 
 def _is_larger(table: ItemTable, large: np.ndarray, small: np.ndarray) -> bool:
-    """Whether all of some items are larger than all others, by volume as well as by the longest extent."""
+    """Whether all items `large` are larger than all items `small`, by volume and by the longest extent."""
     volume, box_volume = table.size.prod(axis=1), (table.high - table.low).prod(axis=1)
     longest = table.size.max(axis=1)
     return bool(
@@ -110,7 +110,7 @@ def _is_larger(table: ItemTable, large: np.ndarray, small: np.ndarray) -> bool:
 
 
 def location_questions(table: ItemTable, search_scopes: tuple[SearchScope, ...]) -> Iterator[QuestionSpec]:
-    """Requests by a group of furniture: the plant in the seating area."""
+    """Questions by a furniture location: the plant in the seating area."""
     for place in table.house.locations:
         answers = location_membership(table, place)
         for scope in search_scopes:
@@ -136,7 +136,7 @@ def _is_alone(table: ItemTable, scope: SearchScope, place: FurnitureLocation) ->
 
 
 def location_membership(table: ItemTable, place: FurnitureLocation) -> TernaryArray:
-    """(N,) whether each item belongs to a location: members do; what stands around it in its room may."""
+    """(N,) whether each item belongs to a location: members do, items around it in its room may."""
     answers = np.full(table.count, NO, np.int8)
     near = (table.room == place.room) & (_distances_to_polygon_m(table.center[:, :2], place.outline) <= NEAR_LOCATION_M)
     answers[(table.room == place.room) if place.kind in ROOM_WIDE_LOCATIONS else near] = MAYBE

@@ -1,7 +1,7 @@
-"""Relations between boxes with three answers: NO, MAYBE and YES; what is merely MAYBE makes a question unfit.
+"""Relations between boxes with three values: NO, MAYBE and YES; a MAYBE makes a question unfit.
 
-An array's row is the target, its column the anchor. The margins between NO and YES are wide on purpose: the truth must
-hold for every sensible way to measure. Metres.
+Rows are targets, columns are anchors. The margins between NO and YES are wide, so that the truth does not depend on how
+a relation is measured. Metres.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ TernaryArray = NDArray[np.int8]
 NEXT_TO_M, NOT_NEXT_TO_M = 0.4, 1.0  # between surfaces
 NEAR_M, NOT_NEAR_M = 0.8, 1.8
 TABLES = ("table", "coffee table", "desk", "kitchen counter", "piano", "bench", "chair", "ironing board", "nightstand")
-CLOSER_RATIO, CLOSER_M = 1.3, 0.3  # how much nearer the closest is than the second
+CLOSER_RATIO, CLOSER_M = 1.3, 0.3  # factor and offset by which the closest is nearer than the second
 
 
 def ternary(yes: Bool, maybe: Bool) -> TernaryArray:
-    """YES where both hold, MAYBE where only the second does, else NO."""
+    """YES where both hold, MAYBE where only the second holds, else NO."""
     return np.where(yes & maybe, YES, np.where(maybe, MAYBE, NO)).astype(np.int8)
 
 
 def single_match(answers: TernaryArray, mask: Bool) -> int | None:
-    """The id of the one item in the mask that is not NO, if that is YES; None otherwise."""
+    """The id of the only item in the mask that is not NO, if it is YES; else None."""
     left = np.flatnonzero(mask & (answers > NO))
     return int(left[0]) if len(left) == 1 and answers[left[0]] == YES else None
 
 
 def relations(table: ItemTable) -> dict[str, TernaryArray]:
-    """(N, N) answers of the relations that need no viewer, by name: on, under, above, below, next to, near."""
+    """(N, N) relations without a viewer by name: on, under, above, below, next to, near."""
     above = _above(table)
     relations_by_name = {
         "on": _on(table),
@@ -70,7 +70,7 @@ def _on(table: ItemTable) -> TernaryArray:
 
 
 def _under(table: ItemTable) -> TernaryArray:
-    """Below furniture, on the floor: wholly or nearly so for YES, by any part of it for MAYBE."""
+    """Below furniture, on the floor: entirely or nearly so for YES, partly for MAYBE."""
     share, lower = _overlap_share(table), table.high[:, None, 2] < table.high[None, :, 2] - 0.02
     floored = (table.support[:, None] == ON_FLOOR) & (table.support[None] == ON_FLOOR)
     roofs = np.array([name in TABLES for name in table.names], bool)[None]
@@ -80,7 +80,7 @@ def _under(table: ItemTable) -> TernaryArray:
 
 
 def _above(table: ItemTable) -> TernaryArray:
-    """Of things on walls and ceilings over furniture: they are in line, and nothing else of that kind is near it."""
+    """Items on walls and ceilings above furniture, aligned with it and with nothing else of that kind near."""
     width = (table.high - table.low)[:, :2]
     lined = -table.axis_gap[..., :2] >= 0.5 * np.minimum(width[:, None], width[None])
     rise = table.low[:, None, 2] - table.high[None, :, 2]
@@ -92,6 +92,7 @@ def _above(table: ItemTable) -> TernaryArray:
 
 
 def _within(table: ItemTable, yes_m: float, no_m: float) -> TernaryArray:
+    """Beside each other with surfaces at most `yes_m` apart; NO beyond `no_m`."""
     level = table.axis_gap[..., 2] < 0
     resting = _rests_on(table)
     apart = ~(resting | resting.T) & (_overlap_share(table) < 0.25) & (_overlap_share(table).T < 0.25)
@@ -100,7 +101,7 @@ def _within(table: ItemTable, yes_m: float, no_m: float) -> TernaryArray:
 
 
 def between(table: ItemTable, a: int, b: int) -> TernaryArray:
-    """(N,) whether each item lies between two others, as seen from above, none of them on or over another."""
+    """(N,) whether each item is between two others in plan, none of them on or over another."""
     start, way = table.center[a, :2], table.center[b, :2] - table.center[a, :2]
     length = max(float(np.linalg.norm(way)), 1e-6)
     offset = table.center[:, :2] - start
@@ -117,7 +118,7 @@ def between(table: ItemTable, a: int, b: int) -> TernaryArray:
 
 
 def closest(table: ItemTable, anchor: int, mask: Bool) -> int | None:
-    """The item of the mask that is nearest to the anchor by surfaces and by middles, with a lead, or None."""
+    """The item of the mask that is nearest to the anchor by surfaces and by centres, by a margin, or None."""
     ids = np.flatnonzero(mask)
     if len(ids) < 2:
         return None
@@ -128,7 +129,7 @@ def closest(table: ItemTable, anchor: int, mask: Bool) -> int | None:
 
 
 def farthest(table: ItemTable, anchor: int, mask: Bool) -> int | None:
-    """The item of the mask that is farthest from the anchor by surfaces and by middles, with a lead, or None."""
+    """The item of the mask that is farthest from the anchor by surfaces and by centres, by a margin, or None."""
     ids = np.flatnonzero(mask)
     if len(ids) < 2:
         return None

@@ -1,4 +1,4 @@
-"""What people call things: the words of each class, and all the classes that a listener may take a word for."""
+"""The words for each class, and all the classes that a listener may understand by a word."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from placegraph.tools.simulator.object_classes import CLASSES
 ClassSet = frozenset[str]  # names of classes
 
 PLURAL = ("curtains", "drapes", "stairs")
-# Words that promise a material, a size or a use that the truth does not hold.
+# Words that state a material, size or use that the ground truth does not contain.
 NEVER_SAID = (
     "wooden chair", "wooden bench", "double bed", "single bed", "wine bottle", "water bottle", "books", "mattress",
     "living room table", "range", "workstation",
 )  # fmt: skip
 
-# All the classes that a listener may take a class's words for; a class that is not here is taken for itself only.
+# The classes that a listener may understand by the words of a class; default: the class itself.
 _CONFUSED_WITH_CLASS: dict[str, tuple[str, ...]] = {
     "chair": ("chair", "armchair", "office chair", "stool"),
     "armchair": ("armchair", "office chair"),
@@ -32,7 +32,7 @@ _CONFUSED_WITH_CLASS: dict[str, tuple[str, ...]] = {
     "potted plant": ("potted plant", "vase"),
     "picture": ("picture", "mirror"),
 }
-# Words that are narrower or wider than the rest of their class's words.
+# Words with a narrower or wider meaning than their class.
 _CONFUSED_WITH_WORD: dict[str, tuple[str, ...]] = {
     "seat": ("chair", "armchair", "office chair", "stool", "bench", "sofa"),
     "dining chair": ("chair", "stool"),
@@ -83,7 +83,7 @@ def _height_m(placed: PlacedItem) -> float:
     return float(high[2] - low[2])
 
 
-# Words that are true of some members of their class only.
+# Words that are true for some members of their class only.
 _TRUE_OF: dict[str, Callable[[House, PlacedItem], bool]] = {
     "kitchen chair": _in_room("kitchen"),
     "kitchen table": _in_room("kitchen"),
@@ -110,7 +110,7 @@ _TRUE_OF: dict[str, Callable[[House, PlacedItem], bool]] = {
 
 @dataclass(frozen=True)
 class NameGroup:
-    """Words for one thing that a listener takes for the same classes, by whether training says them."""
+    """Words for one item that a listener understands as the same classes, by whether training uses them."""
 
     classes: ClassSet
     training_words: tuple[str, ...]
@@ -119,7 +119,7 @@ class NameGroup:
 
 @dataclass(frozen=True)
 class ItemMention:
-    """An item and the words that it is told by."""
+    """An item and the words it is referred to by."""
 
     id: int
     name_group: NameGroup
@@ -127,12 +127,12 @@ class ItemMention:
 
 @cache
 def classes_meant_by(word: str, class_name: str) -> ClassSet:
-    """The names of all classes that a listener may take a word of a class for."""
+    """The names of all classes that a listener may understand by a word of a class."""
     return frozenset(_CONFUSED_WITH_WORD.get(word, _CONFUSED_WITH_CLASS.get(class_name, (class_name,))))
 
 
 def name_groups(house: House, placed: PlacedItem) -> tuple[NameGroup, ...]:
-    """All that a thing may truly be called, in the order of its class's words."""
+    """All true names of an item, in the order of its class's words."""
     object_class = next(object_class for object_class in CLASSES if object_class.name == placed.item.name)
     grouped: dict[ClassSet, tuple[list[str], list[str]]] = {}
     for words, column in ((object_class.training_words, 0), (object_class.held_out_words, 1)):

@@ -1,4 +1,4 @@
-"""A house as arrays over its items, for questions: row i is the item of id i; metres, world frame."""
+"""The items of a house as arrays: row i is the item of id i; metres, world frame."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.tools.simulator.house_model import House
 from placegraph.tools.simulator.question_generation.class_synonyms import ClassSet, NameGroup, name_groups
 
-MIN_TARGET_M = 0.12  # the largest extent of what a camera can plausibly map
+MIN_TARGET_M = 0.12  # smallest largest extent that a camera can map
 MIN_ANCHOR_M = 0.3
 # A door belongs to two rooms, a rug lies under everything.
 NO_TARGETS = ("door", "rug")
@@ -21,7 +21,7 @@ NO_ANCHORS = ("door", "rug", "stairs", "ceiling lamp", "radiator")
 
 @dataclass(frozen=True, eq=False)
 class ItemTable:
-    """The items of a house by id: corners (N, 3), room, floor and support (N,), extents (N, 3) along their own axes."""
+    """Items by id: corners (N, 3), room, floor and support (N,), extents (N, 3) along their own axes."""
 
     house: House
     names: tuple[str, ...]
@@ -34,7 +34,7 @@ class ItemTable:
     support: I64
     name_groups: tuple[tuple[NameGroup, ...], ...]
     can_be_target: Bool  # may be a target
-    can_be_anchor: Bool  # may be what a target is told by
+    can_be_anchor: Bool  # may be an anchor
 
     @property
     def count(self) -> int:
@@ -48,7 +48,7 @@ class ItemTable:
 
     @cached_property
     def axis_gap(self) -> F64:
-        """(N, N, 3) free metres between two boxes along each axis, negative where they overlap by so much."""
+        """(N, N, 3) distance of two boxes along each axis, negative where they overlap."""
         return np.maximum(self.low[:, None] - self.high[None], self.low[None] - self.high[:, None])
 
     @cached_property
@@ -58,7 +58,7 @@ class ItemTable:
 
     @cached_property
     def plan_gap(self) -> F64:
-        """(N, N) metres between two boxes as seen from above."""
+        """(N, N) metres between two boxes in plan."""
         return np.asarray(np.linalg.norm(np.maximum(self.axis_gap[..., :2], 0), axis=2))
 
     @cached_property
@@ -86,7 +86,7 @@ class ItemTable:
         return {}
 
     def of(self, classes: ClassSet) -> Bool:
-        """(N,) which items a word of these classes may mean."""
+        """(N,) which items a word for these classes may mean."""
         if classes not in self._masks_by_classes:
             names = [name for name in sorted(classes) if name in self._of_class]
             masks = [self._of_class[name] for name in names]
@@ -94,7 +94,7 @@ class ItemTable:
         return self._masks_by_classes[classes]
 
     def has_class_peer(self, item_id: int, mask: Bool) -> bool:
-        """Whether a mask (N,) holds another item of one item's own class."""
+        """Whether a mask (N,) holds another item of the same class."""
         return bool(np.count_nonzero(self._of_class[self.names[item_id]] & mask) > 1)
 
 

@@ -1,4 +1,4 @@
-"""A request as a person says it: openers, word choice, politeness, order of the clauses."""
+"""The wording of a question: opener, choice of words, politeness, order of the clauses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from placegraph.tools.simulator.question_generation.class_synonyms import PLURAL
 from placegraph.tools.simulator.question_generation.question_spec import QuestionSpec
 from placegraph.tools.simulator.question_generation.search_scopes import ScopePhrase
 
-HELD_OUT_TARGET_SHARE, HELD_OUT_ANCHOR_SHARE = 0.25, 0.06  # how often a word is one that training never says
+HELD_OUT_TARGET_SHARE, HELD_OUT_ANCHOR_SHARE = 0.25, 0.06  # share of held-out words
 COMMANDS = (
     "find {}", "show me {}", "take me to {}", "go to {}", "lead me to {}", "guide me to {}", "point out {}",
     "look for {}", "bring me to {}", "locate {}",
@@ -21,7 +21,7 @@ QUESTIONS = (
 )  # fmt: skip
 STATEMENTS = ("I'm looking for {}", "I need {}", "I want to see {}", "I can't find {}", "I'd like to go to {}", "{}")
 GREETINGS = ("hey, ", "excuse me, ", "hi, ", "hello, ", "robot, ")
-# Other ways to say a tail; the first words of each are those of the forms.
+# Variants of a relation, by the beginning of the phrase.
 RELATION_VARIANTS: dict[str, tuple[str, ...]] = {
     "next to the": ("next to the", "beside the", "right by the", "right next to the"),
     "near the": ("near the", "close to the", "not far from the"),
@@ -49,7 +49,7 @@ ROW_ADJECTIVES = ("leftmost", "rightmost", "middle", "first", "second", "third",
 
 
 def phrase_question(spec: QuestionSpec, random: np.random.Generator) -> tuple[str, tuple[int, ...], str]:
-    """A request as one sentence, the ids of all items that it is told by, and what it means as a program's text."""
+    """A question as one sentence, the ids of the items it mentions, and its meaning as program text."""
     noun = _word(spec.target.name_group, random, HELD_OUT_TARGET_SHARE)
     words_of_scope = usable_scope_phrases(spec)
     scope = words_of_scope[int(random.integers(len(words_of_scope)))]
@@ -74,14 +74,14 @@ def phrase_question(spec: QuestionSpec, random: np.random.Generator) -> tuple[st
 
 
 def _adjective_conditions(adjective: str) -> tuple[str, ...]:
-    """What an adjective means: a rank, or how the thing looks; places in a row say themselves what they mean."""
+    """The program condition of an adjective: a rank or a property; none for a place in a row."""
     if adjective in ROW_ADJECTIVES:
         return ()
     return (RANKS.get(adjective, f"is {adjective}"),)
 
 
 def usable_scope_phrases(spec: QuestionSpec) -> tuple[ScopePhrase, ...]:
-    """The ways to say a request's scope that do not name an item, or a word's item, a second time."""
+    """The phrases for a question's scope that do not repeat an item or its words."""
     mentioned = (spec.target, *spec.anchors)
     return tuple(
         scope_phrase
@@ -103,12 +103,12 @@ def _word(name_group: NameGroup, random: np.random.Generator, held_out_words: fl
         or name_group.held_out_words
     )
     if len(words) > 1 and random.random() < 0.4:
-        return words[0]  # the plain name is what people say most
+        return words[0]  # the plain name is the most common
     return words[int(random.integers(len(words)))]
 
 
 def _vary_relation(phrase: str, random: np.random.Generator) -> str:
-    """The tail with its relation said in another way; only its first one, which begins it."""
+    """The phrase with its leading relation said in another way."""
     for known, variants in RELATION_VARIANTS.items():
         if phrase.startswith(known):
             return str(random.choice(variants)) + phrase[len(known) :]
@@ -133,7 +133,7 @@ def _sentence(adjective: str, noun: str, phrase: str, place: str, random: np.ran
 
 
 def _add_opener(phrase: str, plural: bool, random: np.random.Generator) -> str:
-    """A noun phrase as a question, an order or a statement, with its full stop or question mark."""
+    """A noun phrase as a question, a command or a statement, with its punctuation."""
     roll = random.random()
     if roll < 0.45:
         text = str(random.choice(QUESTIONS))

@@ -1,4 +1,4 @@
-"""A request before it is put into words: what is asked for, where, and by which things it is told."""
+"""A question before it is put into words: target, scope, and the relations that single the target out."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from placegraph.tools.simulator.question_generation.search_scopes import SearchS
 
 @dataclass(frozen=True, eq=False)
 class QuestionSpec:
-    """One request with one right answer; every `{}` of the tails is a word for the next anchor."""
+    """One question with one right answer; every `{}` of the phrases is a word for the next anchor."""
 
     form: str
     target: ItemMention
     scope: SearchScope
-    adjective: str = ""  # stands before the word: red, largest, second
-    phrases: tuple[str, ...] = ()  # stand behind it: "next to the {}"
-    conditions: tuple[str, ...] = ()  # the same as conditions of a program, `{}` for the anchors in the same order
+    adjective: str = ""  # before the noun: red, largest, second
+    phrases: tuple[str, ...] = ()  # after the noun: "next to the {}"
+    conditions: tuple[str, ...] = ()  # the same as program conditions, `{}` for the anchors in order
     anchors: tuple[ItemMention, ...] = ()
     eye: F64 | None = None  # (3,) where the asker stands
     is_ambiguous: bool = True  # without the relation, the noun and the scope alone fit other items, too
 
 
 def unique_mentions(table: ItemTable, scope: SearchScope) -> list[ItemMention]:
-    """All ways to tell an anchor of a scope by a word that means nothing else there."""
+    """All anchors of a scope with the words that mean nothing else there."""
     mentions = []
     for item_id in np.flatnonzero(table.can_be_anchor & scope.mask).tolist():
         mentions += [

@@ -1,4 +1,4 @@
-"""Requests by other things, without a viewer: on, under, above, below, next to, near, closest, between, several."""
+"""Questions by relations without a viewer: on, under, above, below, next to, near, closest, between, two relations."""
 
 from __future__ import annotations
 
@@ -31,15 +31,13 @@ PROGRAM_TEXTS: dict[str, str] = {
     "near": "near ({})", "closest": "closest ({})", "farthest": "farthest ({})", "between": "between ({}, {})",
 }  # fmt: skip
 MAX_ANCHOR_DISTANCE_M = 4.5  # between two anchors
-MIN_ANCHOR_SIZE_RATIO = (
-    0.3  # share of a target's longest extent that an anchor needs at least, or it is too small to tell it by
-)
+MIN_ANCHOR_SIZE_RATIO = 0.3  # smallest size of an anchor relative to the target
 
 
 def relation_questions(
     table: ItemTable, scope: SearchScope, answers: dict[str, TernaryArray]
 ) -> Iterator[QuestionSpec]:
-    """Requests by one anchor: on, under, above, below, next to, near, closest, farthest."""
+    """Questions by one anchor: on, under, above, below, next to, near, closest, farthest."""
     for anchor in unique_mentions(table, scope):
         for form, relation in answers.items():
             column = relation[:, anchor.id]
@@ -51,7 +49,7 @@ def relation_questions(
 
 
 def _targets(table: ItemTable, scope: SearchScope, anchor: ItemMention, fit: Bool) -> Iterator[ItemMention]:
-    """Items that may be asked for by an anchor, under all their words for which there is another in the house."""
+    """Items that may be asked for by an anchor, with all words that also mean another item of the house."""
     longest = table.size.max(axis=1)
     fit = fit & table.can_be_target & scope.mask & (longest[anchor.id] >= MIN_ANCHOR_SIZE_RATIO * longest)
     for item_id in np.flatnonzero(fit).tolist():
@@ -68,11 +66,11 @@ def _question(
 
 
 def _by_distance(table: ItemTable, scope: SearchScope, anchor: ItemMention) -> Iterator[QuestionSpec]:
-    """The closest of a scope to an anchor, and the farthest of a room; not where they touch."""
+    """The item of a scope closest to an anchor, and the farthest in a room; not where they touch."""
     done: set[frozenset[str]] = set()
     for target in _targets(table, scope, anchor, table.same_room[:, anchor.id]):
         if target.name_group.classes in done:
-            continue  # one search finds the winner of all that share a word
+            continue  # one search covers all items that share a word
         done.add(target.name_group.classes)
         peers = table.of(target.name_group.classes) & scope.mask
         peers[anchor.id] = False
@@ -88,13 +86,13 @@ def _by_distance(table: ItemTable, scope: SearchScope, anchor: ItemMention) -> I
 
 
 def _is_told_by_distance(table: ItemTable, target: int, anchor: int) -> bool:
-    """Whether an item may be asked for by its distance to another: they are in a room and do not carry each other."""
+    """Whether a distance to the anchor may single an item out: same room, neither carries the other."""
     carried = table.support[target] == anchor or table.support[anchor] == target
     return bool(table.can_be_target[target] and table.same_room[target, anchor] and not carried)
 
 
 def between_questions(table: ItemTable, scope: SearchScope) -> Iterator[QuestionSpec]:
-    """Requests by two anchors of one room that the target lies between."""
+    """Questions by two anchors of one room between which the target is."""
     anchors = unique_mentions(table, scope)
     for k, first in enumerate(anchors):
         for second in anchors[k + 1 :]:
@@ -110,7 +108,7 @@ def between_questions(table: ItemTable, scope: SearchScope) -> Iterator[Question
 def two_relation_questions(
     table: ItemTable, scope: SearchScope, answers: dict[str, TernaryArray], random: np.random.Generator
 ) -> Iterator[QuestionSpec]:
-    """Requests by two relations of the target: the lamp next to the bed and near the window."""
+    """Questions by two relations of the target: the lamp next to the bed and near the window."""
     anchors = unique_mentions(table, scope)
     for first in anchors:
         for second in anchors:
@@ -141,7 +139,7 @@ def two_relation_questions(
 
 
 def chain_questions(table: ItemTable, scope: SearchScope, answers: dict[str, TernaryArray]) -> Iterator[QuestionSpec]:
-    """Requests by an anchor that is told by another: the book on the nightstand next to the bed."""
+    """Questions by an anchor that needs an anchor itself: the book on the nightstand next to the bed."""
     for last in unique_mentions(table, scope):
         for link in ("next to", "near", "below"):
             linked = answers[link][:, last.id]
@@ -186,7 +184,7 @@ def _has_one_reading(
     last: ItemMention,
     link: str,
 ) -> bool:
-    """Whether no other item fits when the second relation is taken for the target's own, not for its anchor's."""
+    """Whether no other item fits when the second relation is attached to the target instead of the anchor."""
     group = table.of(middle.classes)
     at_some = answers[form][:, group].max(axis=1)
     also_fits = np.minimum(at_some, answers[link][:, last.id]) > NO

@@ -1,4 +1,4 @@
-"""Where a request looks: the whole house, a floor or a room, and the words that name it without doubt."""
+"""Where a question searches: the whole house, a floor or a room, with unambiguous words for it."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ ROOM_WORDS: dict[str, tuple[str, ...]] = {
     "hallway": ("hallway", "hall"),
     "corridor": ("corridor", "hallway"),
 }
-INTERCHANGEABLE_ROOMS = ("hallway", "corridor")  # a listener may take one for the other
-AREA_RATIO = 1.25  # a room is larger than another from here on
+INTERCHANGEABLE_ROOMS = ("hallway", "corridor")  # words that are used for each other
+AREA_RATIO = 1.25  # smallest ratio of areas for "larger"
 
 
 @dataclass(frozen=True)
 class ScopePhrase:
-    """One way to say a scope; `{}` in it is a word for the item `inside`."""
+    """One phrase for a scope; `{}` in it is a word for the item `landmark`."""
 
     text: str
     landmark: ItemMention | None = None
-    conditions: tuple[str, ...] = ()  # the same as conditions of a program, `{}` for the item
+    conditions: tuple[str, ...] = ()  # the same as program conditions, `{}` for the landmark
 
 
 @dataclass(frozen=True, eq=False)
 class SearchScope:
-    """Items to look among (N,), and all ways to say so; the house is said by saying nothing."""
+    """A mask of items (N,) and all phrases for it; the phrase for the house is empty."""
 
     kind: str  # house, floor, room
     mask: Bool
@@ -56,7 +56,7 @@ def search_scopes(table: ItemTable) -> tuple[SearchScope, ...]:
 
 
 def floor_words(index: int, floors: int) -> tuple[str, ...]:
-    """Words for a floor that nobody takes for another; "first floor" is never among them, it means two things."""
+    """Unambiguous words for a floor; never "first floor", which has two meanings."""
     if floors == 2:
         return (
             ("upstairs", "on the upper floor", "on the second floor")
@@ -73,7 +73,7 @@ def _on_floor(words: str) -> ScopePhrase:
 
 
 def _in_room(text: str, *conditions: str, floor: str = "") -> ScopePhrase:
-    """Words for a room, its name first among the conditions; floor: those of the floor that follow it."""
+    """A phrase for a room, its name first among the conditions; floor: the words of the floor that follow it."""
     place = _on_floor(floor).conditions if floor else ()
     return ScopePhrase(
         f"in the {text}{' ' * bool(floor)}{floor}", conditions=(f"room ({'; '.join(conditions)})", *place)
@@ -81,7 +81,7 @@ def _in_room(text: str, *conditions: str, floor: str = "") -> ScopePhrase:
 
 
 def _rooms_of_word(table: ItemTable, room: Room) -> list[Room]:
-    """All rooms that the word for a room may mean, itself among them."""
+    """All rooms that the word for a room may mean, including itself."""
     kinds = INTERCHANGEABLE_ROOMS if room.type in INTERCHANGEABLE_ROOMS else (room.type,)
     return [room for room in table.house.rooms if room.type in kinds]
 
@@ -138,7 +138,7 @@ def area_m2(room: Room) -> float:
 
 
 def _content_words(table: ItemTable, room: Room, may_be_confused: list[Room], name: str) -> list[ScopePhrase]:
-    """The room with the desk: it has one, no room that the word may mean has another."""
+    """The room with the desk: no other room that the word may mean has one."""
     among = np.isin(table.room, [room.id for room in may_be_confused])
     words = []
     for item_id in np.flatnonzero(table.can_be_anchor & (table.room == room.id)).tolist():

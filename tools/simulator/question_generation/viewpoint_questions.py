@@ -1,4 +1,4 @@
-"""Requests that depend on where the asker stands: left, right, in front, behind, and places in a row."""
+"""Questions that depend on the position of the asker: left, right, in front, behind, and places in a row."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from placegraph.tools.simulator.question_generation.item_table import ItemTable
 from placegraph.tools.simulator.question_generation.question_spec import QuestionSpec, unique_mentions
 from placegraph.tools.simulator.question_generation.search_scopes import SearchScope
 
-# Things without a front of their own: before and behind them is told by the viewer alone.
+# Classes without a front: front and behind depend on the viewer alone.
 NO_FRONT = (
     "table",
     "coffee table",
@@ -33,7 +33,7 @@ NO_FRONT = (
     "trash can",
     "laundry basket",
 )
-FRONT_DEGREES = 45.0  # from an anchor's own front, where the viewer's and the anchor's front are one
+FRONT_DEGREES = 45.0  # from an anchor's front; within it the viewer's and the anchor's front agree
 PHRASES: dict[str, str] = {
     "left": "to the left of the {}", "right": "to the right of the {}",
     "front": "in front of the {}", "behind": "behind the {}",
@@ -50,7 +50,7 @@ COUNTED = ("first", "second", "third", "fourth")
 def viewpoint_questions(
     table: ItemTable, scope: SearchScope, positions: dict[int, tuple[AskerPosition, ...]]
 ) -> Iterator[QuestionSpec]:
-    """Requests left of, right of, in front of and behind an anchor, for one who stands in its room and looks at it."""
+    """Questions left of, right of, in front of and behind an anchor, for a viewer in its room who looks at it."""
     for anchor in unique_mentions(table, scope):
         room = int(table.room[anchor.id])
         for position in positions.get(room, ()):
@@ -89,23 +89,23 @@ def _questions_from(
 
 
 def _viewer_condition(position: AskerPosition) -> tuple[str, ...]:
-    """The view that is said; that of the asker is not."""
+    """The program condition of a viewpoint that is named; the asker's own is not."""
     return (f"from ({position.door})",) if position.door else ()
 
 
 def _fits(table: ItemTable, form: str, target: int, anchor: int, peers: np.ndarray) -> bool:
-    """Whether nothing is carried by the other; before and behind, no peer is nearer: so people use these words."""
+    """Whether neither carries the other and, for front and behind, no peer is nearer to the anchor."""
     if table.support[target] == anchor or table.support[anchor] == target:
         return False
     if form == "front" and table.support[target] < ON_FLOOR:
-        return False  # what hangs on a wall is before nothing
+        return False  # items on a wall are in front of nothing
     rivals = np.flatnonzero(peers)
     rivals = rivals[(rivals != target) & (rivals != anchor)]
     return form in ("left", "right") or bool((table.gap[rivals, anchor] > table.gap[target, anchor] + 0.2).all())
 
 
 def _faces_front(table: ItemTable, position: AskerPosition, anchor: int) -> bool:
-    """Whether the asker stands before the anchor's own front, or it has none."""
+    """Whether the asker stands in front of the anchor's own front, or it has none."""
     if table.names[anchor] in NO_FRONT:
         return True
     yaw = table.house.items[anchor].yaw
@@ -117,7 +117,7 @@ def _faces_front(table: ItemTable, position: AskerPosition, anchor: int) -> bool
 def ordinal_questions(
     table: ItemTable, scope: SearchScope, positions: dict[int, tuple[AskerPosition, ...]]
 ) -> Iterator[QuestionSpec]:
-    """Requests by the place in a row: the second chair from the left, for one who looks at all of them."""
+    """Questions by place in a row: the second chair from the left, for a viewer who sees all of them."""
     if scope.room is None:
         return
     kinds = sorted(
@@ -153,7 +153,7 @@ def ordinal_questions(
 def _row_questions(
     scope: SearchScope, target: ItemMention, place: int, row: int, pure: bool, position: AskerPosition
 ) -> Iterator[QuestionSpec]:
-    """Words for a place in a row of so many; of mixed classes only the ends are the same for every listener."""
+    """Words for a place in a row; with mixed classes only the ends are unambiguous."""
     phrase = f"as seen from the {position.door}" if position.door else "from where I stand"
     for index, end in ((place, "left"), (row - 1 - place, "right")):
         if index == 0:

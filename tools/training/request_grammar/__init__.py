@@ -1,7 +1,7 @@
-"""Generated requests with their programs, to train the reader: a grammar that says each program in many ways.
+"""Generated requests with their programs for training the reader: a grammar with many phrasings of each program.
 
-Whole phrasings and nouns are held out for validation (speaker.is_held). What is said follows the conventions of
-nodes/grounding/program.py. Source: METHOD section 10; 400 requests of people were read for it, none is in it.
+Whole phrasings and nouns are held out for validation (phrase_grammar.is_held_out). Meanings follow the conventions of
+nodes/grounding/program.py. The grammar was written after reading 400 requests of people; none of them is in it.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ MAX_WORDS = 60
 
 @dataclass(frozen=True)
 class Example:
-    """A request and its program in the notation."""
+    """A request and its program as text."""
 
     text: str
     program: str
 
 
 def examples(seed: int, start: int, count: int, *, held_out: bool = False) -> list[Example]:
-    """Examples number start to start + count of a seed, each the same whatever is asked for beside it.
+    """Examples number start to start + count of a seed; an example does not depend on the range.
 
-    held_out: half of what is drawn from a list is of the nouns and phrasings that no other example has.
+    held_out: half of the draws from a list come from nouns and phrasings that no other example has.
     """
     return [_example(seed, number, held_out) for number in range(start, start + count)]
 
@@ -46,7 +46,7 @@ def _example(seed: int, number: int, held_out: bool) -> Example:
 
 
 def _as_tokens(thing: Thing) -> Thing:
-    """The thing with nouns and words as the tokens of the request spell them, which is all that the reader can copy."""
+    """The thing with nouns and words as the tokens of the request, which is all that the reader can copy."""
     conditions = tuple(
         condition.model_copy(
             update={"words": " ".join(tokens(condition.words)), "things": tuple(map(_as_tokens, condition.things))}

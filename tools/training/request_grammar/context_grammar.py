@@ -1,4 +1,4 @@
-"""What stands around a request: its room and storey, the view, greetings, words that say nothing."""
+"""The context of a request: room and floor, viewpoint, greetings, fillers."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class ContextGrammar:
         return say.random.choice(ROOM_LINKS).format(said), Condition(name="room", things=(thing,))
 
     def add_viewpoint(self, text: str, conditions: list[Condition]) -> tuple[str, list[Condition]]:
-        """From where it is seen; more often where a side is said."""
+        """Adds a viewpoint, more often where the target has a side."""
         say = self.say
         if not say.chance(0.33 if SIDED & {condition.name for condition in conditions} else 0.05):
             return text, conditions
@@ -134,7 +134,7 @@ class ContextGrammar:
         return f"{said}{lead}{text}", [view, *conditions]
 
     def add_fillers(self, text: str) -> str:
-        """Words around it that say nothing; marks at the end."""
+        """Adds greetings, fillers and punctuation."""
         say = self.say
         if say.chance(0.07):
             text = f"{say.pick(GREETINGS)} {text}"

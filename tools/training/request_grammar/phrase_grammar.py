@@ -1,7 +1,7 @@
-"""Noun phrases with their meaning: what is said of a thing before and behind its noun.
+"""Noun phrases with their meaning: what is said of a thing before and after its noun.
 
-Each phrase carries the conditions that it says, in the order in which they are said. A condition that directly follows
-an anchor is the anchor's; so what is the target's and follows one gets a comma or an "and" (sentences.py).
+Each phrase carries its conditions in the order in which they are said. A condition that directly follows an anchor
+belongs to the anchor; so one of the target after an anchor gets a comma or an "and" (sentence_grammar.py).
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from placegraph.nodes.grounding.program import CONDITIONS, SAME_KIND, Condition,
 from placegraph.tools.training.request_grammar import relation_phrases as relations
 from placegraph.tools.training.request_grammar import vocabulary as words
 
-HELD_SHARE = 8  # one in so many phrasings and nouns is kept for validation,
+HELD_SHARE = 8  # one in this many phrasings and nouns is kept for validation,
 COMMON = 3  # but for the first ones of each list, which are what most people say
 MAX_DEPTH = 3
 
 
 @dataclass
 class Phrase:
-    """Words behind a noun and what they say; `predicate`: the same behind the noun and a verb."""
+    """Words after a noun and their conditions; `predicate`: the same after the noun and a verb."""
 
     text: str
     predicate: str
@@ -32,7 +32,7 @@ class Phrase:
 
 @dataclass
 class NounPhrase:
-    """A noun with what stands around it; `text` has no article."""
+    """A noun with the words around it; `text` has no article."""
 
     before: list[str] = field(default_factory=list)
     noun: str = ""
@@ -51,7 +51,7 @@ def is_held_out(option: str) -> bool:
 
 
 class PhraseGrammar:
-    """Draws phrases. held_out: also from the phrasings and nouns that training never says, and from them mostly."""
+    """Draws phrases. held_out: mostly from the phrasings and nouns that training never uses."""
 
     def __init__(self, random: Random, held_out: bool) -> None:
         self.random, self.held_out = random, held_out
@@ -62,7 +62,7 @@ class PhraseGrammar:
         return self.random.random() < share
 
     def pick(self, options: Sequence[str]) -> str:
-        """One of the options that may be said."""
+        """One of the options that may be used."""
         if len(options) < 4:
             return self.random.choice(options)
         held = [option for option in options[COMMON:] if is_held_out(option)]
@@ -108,7 +108,7 @@ class PhraseGrammar:
         return noun[:-1] + "ies" if noun.endswith("y") and noun[-2] not in "aeiou" else noun + "s"
 
     def adjectives(self, most: int) -> tuple[list[str], list[Condition]]:
-        """Adjectives before a noun, no two of one sort."""
+        """Up to `most` adjectives before a noun, no two of one kind."""
         sorts = [words.SIZES, words.STATES, words.SHAPES, words.COLORS, words.MATERIALS]
         shares = self.random.choices(range(5), (5, 2.5, 1.5, 7, 2.5), k=most)
         said = [self.pick(sorts[i]) for i in sorted(set(shares))]
@@ -117,7 +117,7 @@ class PhraseGrammar:
         return said, [Condition(name="is", words=word) for word in said]
 
     def article(self, indefinite: float = 0.1) -> str:
-        """An article; left out now and then, as people do."""
+        """An article, sometimes omitted, as people do."""
         luck = self.random.random()
         return (
             "" if luck < 0.06 else self.random.choice(("a ", "that ", "some ")) if luck < indefinite + 0.06 else "the "
@@ -126,7 +126,7 @@ class PhraseGrammar:
     # things that something else is told by ----------------------------------------------------------------------------
 
     def anchor(self, depth: int, *, simple: bool = False, noun: str = "") -> tuple[str, Thing]:
-        """A noun phrase with its article, and the thing that it means. simple: nothing behind its noun."""
+        """A noun phrase with its article, and its meaning. simple: nothing after its noun."""
         luck = self.random.random() if not noun else 0.5
         if luck < 0.04 and self.target_noun and not simple:
             return self._same_kind_anchor()
@@ -163,7 +163,7 @@ class PhraseGrammar:
         return text, Thing(noun=noun, conditions=(Condition(name="count", number=number), *conditions))
 
     def noun_phrase(self, noun: str, depth: int, *, simple: bool = False) -> NounPhrase:
-        """A noun with looks, a rank before it, and a condition behind it, less of all the deeper it lies."""
+        """A noun with adjectives, a rank and a condition after it; fewer with depth."""
         phrase = NounPhrase(noun=noun)
         if self.chance(0.09):
             name = self.weighted(relations.BEFORE_WEIGHTS)
@@ -243,7 +243,7 @@ class PhraseGrammar:
         return self._phrase(self.pick(relations.BARE[name]), Condition(name=name, negated=self.chance(0.05)))
 
     def _phrase(self, said: str, condition: Condition, anchored: bool = False) -> Phrase:
-        """Behind a noun with or without "that is", and behind a verb."""
+        """The phrase after a noun with or without "that is", and after a verb."""
         relative = said.startswith("that ")
         no = self.random.choice(("not ", "not ", "NOT ")) if condition.negated else ""
         if relative:
@@ -259,7 +259,7 @@ class PhraseGrammar:
         return Phrase(f"{opening}{no}{said}", f"{no}{said}", [condition], anchored)
 
     def possession(self) -> Phrase:
-        """What a thing has on, in, under, beside it: with a lamp on it; that does not have a printer."""
+        """What a thing has on, in, under or beside it: with a lamp on it; that does not have a printer."""
         negated = self.chance(0.15)
         if self.chance(0.08) and not negated:
             text, thing = self.anchor(MAX_DEPTH, simple=True)

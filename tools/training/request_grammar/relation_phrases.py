@@ -1,4 +1,4 @@
-"""How conditions are said: templates by condition name; {} is where the anchor with its article goes."""
+"""Phrase templates by condition name; {} is the anchor with its article."""
 
 from __future__ import annotations
 
@@ -77,13 +77,13 @@ PLACED: dict[str, tuple[str, ...]] = {
         "the furthest from {}", "farther away from {}", "the furthest distance away from {}",
     ),
 }  # fmt: skip
-# How often each is said, by and large as in requests of people.
+# Frequencies, roughly as in requests of people.
 WEIGHTS = {
     "near": 20, "on": 13, "under": 7, "above": 7, "in": 2, "left": 5, "right": 5, "front": 6, "behind": 5, "across": 2,
     "against": 3, "end": 1.5, "along": 1.5, "facing": 1, "corner": 0.7, "center": 1, "closest": 14, "farthest": 8,
 }  # fmt: skip
 
-# Said of what the target has: behind "with"/"that has"/"has"/"without"; the name is the target's own side of it.
+# What the target has, after "with", "that has", "without"; the name is the relation of the target.
 HAVING: dict[str, tuple[str, ...]] = {
     "holds": ("{} on it", "{} on top", "{} on top of it", "{} in it", "{} inside", "{} sitting on it",
         "{} on them", "{} inside it",
@@ -153,7 +153,7 @@ BEFORE: dict[str, tuple[str, ...]] = {
     "farthest": ("farthest", "furthest", "further", "farther", "most distant"),
     "alone": ("solo", "lone", "isolated", "solitary"),
 }  # fmt: skip
-# What hangs or leans is said to do so on a wall; what stands, on the floor.
+# Anchors that are part of the building, by relation.
 BUILT = {"on": ("wall", "floor", "wall", "ground"), "against": ("wall",), "along": ("wall",), "above": ("floor",)}
 BEFORE_WEIGHTS = {
     "leftmost": 6, "rightmost": 6, "middle": 4, "frontmost": 2, "backmost": 2, "largest": 6, "smallest": 6,

@@ -1,4 +1,4 @@
-"""Requests as people say them: openers, statements, order of the parts, several sentences."""
+"""Whole requests as people say them: openers, statements, order of the parts, several sentences."""
 
 from __future__ import annotations
 
@@ -124,14 +124,14 @@ class SentenceGrammar:
             phrase.conditions.append(Condition(name=name))
 
     def _joined(self, text: str, behind: list[Phrase], *, anchored: bool = False) -> tuple[str, list[Condition]]:
-        """Phrases of the target one after another; what follows an anchor begins anew."""
+        """The phrases of the target one after another, with a separator after an anchor."""
         say, conditions = self.say, []
         for i, phrase in enumerate(behind):
             if anchored:
                 link = say.random.choice(
                     (", ", " and ", ", and ", " and is ", ", it is ", " and it's ", " , ", " but ", ". it is ")
                 )
-                if phrase.text.startswith(("that ", "which ")):  # after a comma these would be said of the anchor
+                if phrase.text.startswith(("that ", "which ")):  # after a comma these would refer to the anchor
                     link = say.random.choice((" and ", ", and ", " and is "))
                 verb = link.rstrip().endswith(("is", "it's"))
                 said = phrase.predicate if verb and not phrase.predicate.startswith("|") else phrase.text

@@ -1,4 +1,4 @@
-"""Words of the generated language: things, looks and places. General English of homes and offices."""
+"""Vocabulary of the grammar: things, adjectives and places of homes and offices."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ THINGS = _words(
     "chess set, "
     "puzzle, lego set, candle holder, coaster, wine rack, spice rack, fruit bowl, banana, apple, orange, bread, cake"
 )
-# Not of homes, or rare: they teach to copy whatever word is said.
+# Rare things, which teach the reader to copy any word.
 RARE = _words(
     "angel statue, anchor, antenna, anvil, aquarium, armor, axe, badge, bagpipe, balloon, barrel, beaker, bell, "
     "birdcage, "
