@@ -27,12 +27,16 @@ PACKAGES = {
 ONLY_IMPORTERS = {
     "zenoh": ("runtime/bus/session.py",),
     "rerun": ("runtime/recording.py", "nodes/recorder/"),
-    "onnxruntime": ("models_onnx/session.py", "tools/training/export.py"),
+    "onnxruntime": ("models_onnx/session.py", "tools/training/onnx_export.py"),
     "kiss_icp": ("nodes/pose/kiss_icp.py",),
     "llama_cpp": ("runtime/language/llama_library.py", "runtime/language/language_model.py"),
     "wordllama": ("models_onnx/text_encoder.py",),
     "depthai": ("nodes/camera/oak.py",),
-    "onnx": ("tools/training/drawn_scene_network.py", "tools/training/export.py", "tools/training/fold.py"),
+    "onnx": (
+        "tools/training/drawn_scene_network.py",
+        "tools/training/onnx_export.py",
+        "tools/training/batch_norm_folding.py",
+    ),
     "torch": ("tools/training/",),
     "embreex": ("tools/simulator/",),
     "trimesh": ("tools/export/glb.py",),

@@ -41,7 +41,7 @@ class Synthetic:
         # By name, as a plug-in: the generator is a tool, which a node must not import, and it needs libraries (ray
         # casting) that no other node needs. Loaded here so that a missing one is reported before the run starts.
         plugin("placegraph.tools.simulator", "render", "Renderer", "house generator")
-        self._generator = plugin("placegraph.tools.simulator", "build", "HouseFrames", "house generator")
+        self._generator = plugin("placegraph.tools.simulator", "house_frames", "HouseFrames", "house generator")
 
     @staticmethod
     def matches(path: Path) -> bool:

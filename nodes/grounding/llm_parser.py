@@ -1,6 +1,7 @@
 """A request read into a program by the language model with its adapter, held to the grammar of that request's programs.
 
-Source: METHOD section 10, step 1. The adapter is trained by tools/training/reader.py on the very prompts written here.
+Source: METHOD section 10, step 1. The adapter is trained by
+tools/training/reader_training.py on the prompts written here.
 """
 
 from __future__ import annotations

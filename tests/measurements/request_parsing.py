@@ -21,7 +21,7 @@ from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.training.language import examples
+from placegraph.tools.training.request_grammar import examples
 
 ROOT = Path(__file__).parents[2]
 PROGRAMS = ROOT / "tests" / "nodes" / "grounding" / "human_programs.jsonl"

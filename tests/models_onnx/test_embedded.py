@@ -10,9 +10,9 @@ from placegraph.models_onnx.load import load
 from placegraph.models_onnx.manifest import EMBEDDED_DIR
 from placegraph.tools.evaluate.evaluation_views import EvaluationView, evaluation_views
 from placegraph.tools.evaluate.mask_iou import mask_overlaps
-from placegraph.tools.simulator.classes import NAMES
-from placegraph.tools.training.samples import load_shards
-from placegraph.tools.training.views import EVALUATION_SEEDS, render_house
+from placegraph.tools.simulator.object_classes import NAMES
+from placegraph.tools.training.data_augmentation import load_shards
+from placegraph.tools.training.view_rendering import EVALUATION_SEEDS, render_house
 
 MAX_BYTES = 4_000_000
 

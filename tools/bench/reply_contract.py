@@ -23,9 +23,9 @@ from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.runtime.scene_graph.object_list import parse_object_list
 from placegraph.runtime.scene_graph.object_list_import import graph_from_object_list
 from placegraph.tools.bench.hostile_requests import requests
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.listing import object_list
-from placegraph.tools.simulator.questions import questions
+from placegraph.tools.simulator.house_frames import generate_house
+from placegraph.tools.simulator.object_list_export import object_list
+from placegraph.tools.simulator.questions import generate_questions
 
 NODE_ID = re.compile(r"\b[BFRLOC][0-9]+\b")
 TIMEOUT_S = 600.0  # of the query server: long enough that slow replies show in the times and not as timeouts
@@ -74,9 +74,9 @@ def fuzz(count: int, *, mode: str, seed: int, floors: int = 2, settings: dict[st
 
     The map is an object list of a simulated house with so many floors. settings: of the grounding node.
     """
-    house = build(seed, floors)
+    house = generate_house(seed, floors)
     graph = graph_from_object_list(parse_object_list(object_list(house), f"house {seed}"), f"house {seed}").graph
-    texts = [question.text for question in questions(house, seed)]
+    texts = [question.text for question in generate_questions(house, seed)]
     outcome, process = FuzzOutcome(), psutil.Process()
     with _running(graph, settings or {}) as node:
         for number, (kind, payload) in enumerate(requests(texts, count, seed)):

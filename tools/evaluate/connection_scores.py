@@ -14,7 +14,7 @@ from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Connection
 from placegraph.runtime.vision.geometry import transform
 from placegraph.tools.evaluate.place_overlap import ratio
-from placegraph.tools.simulator.truth import TrueConnection, Truth
+from placegraph.tools.simulator.ground_truth import TrueConnection, Truth
 
 KINDS = {"doors": ("door", "opening", "archway"), "stairs": ("stairs",)}
 MAX_DISTANCE_M = {"doors": 0.5, "stairs": 1.0}  # of the worse end, for a found one to be right; chosen by hand

@@ -11,10 +11,10 @@ import numpy as np
 from placegraph.runtime.arrays import F32, F64, I64, U8, U16, Bool
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.evaluate.box_average_precision import TrueBoxes
-from placegraph.tools.simulator.build import generator_version
-from placegraph.tools.simulator.classes import NAMES
-from placegraph.tools.training.samples import MIN_SHARE, Shard, load_shards
-from placegraph.tools.training.views import EVALUATION_SEEDS, HEIGHT, WIDTH, render_houses
+from placegraph.tools.simulator.house_frames import generator_version
+from placegraph.tools.simulator.object_classes import NAMES
+from placegraph.tools.training.data_augmentation import MIN_SHARE, Shard, load_shards
+from placegraph.tools.training.view_rendering import EVALUATION_SEEDS, HEIGHT, WIDTH, render_houses
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,8 @@ from placegraph.runtime.query.request import make_question
 from placegraph.runtime.vision.geometry import box_iou
 from placegraph.tools.evaluate.place_overlap import ratio
 from placegraph.tools.query.offline_query import OfflineQuery
-from placegraph.tools.simulator.questions import AskedQuestion, from_json
-from placegraph.tools.simulator.truth import QUESTIONS, TRUTH
+from placegraph.tools.simulator.ground_truth import QUESTIONS, TRUTH
+from placegraph.tools.simulator.questions import HouseQuestion, from_json
 
 IOUS = (0.1, 0.25, 0.5, 0.75)  # source: paper, "Metrics" of object grounding
 
@@ -32,7 +32,7 @@ class QuestionResult:
     ms: float
 
 
-def read_questions(source: Path) -> list[AskedQuestion] | None:
+def read_questions(source: Path) -> list[HouseQuestion] | None:
     """The questions of a house folder; None when it has none. Raises SourceError naming what is damaged."""
     file = source / TRUTH / QUESTIONS
     if not file.exists():
@@ -46,7 +46,7 @@ def read_questions(source: Path) -> list[AskedQuestion] | None:
         raise SourceError(f"{file}: {error}") from None
 
 
-def ask_all(folder: Path, questions: Sequence[AskedQuestion], true_from_map: F64) -> list[QuestionResult]:
+def ask_all(folder: Path, questions: Sequence[HouseQuestion], true_from_map: F64) -> list[QuestionResult]:
     """The map's reply to each question; true_from_map (4, 4) moves the map onto the truth."""
     results = []
     with OfflineQuery() as query:
@@ -56,7 +56,7 @@ def ask_all(folder: Path, questions: Sequence[AskedQuestion], true_from_map: F64
     return results
 
 
-def eye_in_map(asked: AskedQuestion, true_from_map: F64) -> list[float] | None:
+def eye_in_map(asked: HouseQuestion, true_from_map: F64) -> list[float] | None:
     """Where the asker stands, metres, map frame; None where the answer does not depend on it."""
     if asked.viewpoint is None:
         return None
@@ -65,7 +65,7 @@ def eye_in_map(asked: AskedQuestion, true_from_map: F64) -> list[float] | None:
 
 
 def grounding_scores(
-    questions: Sequence[AskedQuestion], results: Sequence[QuestionResult], boxes: dict[str, F64]
+    questions: Sequence[HouseQuestion], results: Sequence[QuestionResult], boxes: dict[str, F64]
 ) -> dict[str, Any]:
     """Scores overall and by form; `boxes` are the map objects' (2, 3) by id, in the frame of the questions."""
     ious = np.array(

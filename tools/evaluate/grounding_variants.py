@@ -32,9 +32,9 @@ from placegraph.tools.evaluate.grounding_scores import QuestionResult, eye_in_ma
 from placegraph.tools.evaluate.trajectory_error import level_alignment, paired
 from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph
 from placegraph.tools.map_files.trajectory_file import read_trajectory
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.questions import AskedQuestion, questions
-from placegraph.tools.simulator.true_graph import true_graph
+from placegraph.tools.simulator.ground_truth_graph import ground_truth_graph
+from placegraph.tools.simulator.house_frames import generate_house
+from placegraph.tools.simulator.questions import HouseQuestion, generate_questions
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,22 +47,24 @@ class QuestionScene:
 
     name: str
     graph: SceneGraph
-    questions: Sequence[AskedQuestion]
+    questions: Sequence[HouseQuestion]
     true_from_graph: F64
     boxes: Mapping[str, F64]
     true_ids: bool = False
 
-    def question(self, asked: AskedQuestion, mode: str = "program") -> Question:
+    def question(self, asked: HouseQuestion, mode: str = "program") -> Question:
         """What the asker sends: the text, and where it stands in the graph's frame."""
         return make_question(asked.text, mode=mode, pose=eye_in_map(asked, self.true_from_graph))
 
 
 def house_scene(seed: int, count: int) -> QuestionScene:
     """The true graph of the house of a seed, with up to `count` questions."""
-    house = build(seed)
-    graph = true_graph(house)
+    house = generate_house(seed)
+    graph = ground_truth_graph(house)
     boxes = {node.id: node.box for node in graph.layer("object")}
-    return QuestionScene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes, true_ids=True)
+    return QuestionScene(
+        f"house {seed}", graph, generate_questions(house, seed, count), np.eye(4), boxes, true_ids=True
+    )
 
 
 def map_scene(folder: Path, source: Path) -> QuestionScene:
@@ -89,7 +91,7 @@ class VariantRunner:
         self._saved_ms, self._saved_calls = 0.0, 0  # of a kept reading: added to the time of the variant that uses it
         self._flat: dict[str, SceneGraph] = {}
 
-    def ask(self, variant: str, scene: QuestionScene, asked: AskedQuestion) -> QuestionResult:
+    def ask(self, variant: str, scene: QuestionScene, asked: HouseQuestion) -> QuestionResult:
         """The reply of one variant."""
         calls, began = self.model.calls, time.perf_counter()
         self._saved_ms, self._saved_calls = 0.0, 0
@@ -101,17 +103,17 @@ class VariantRunner:
         calls = self.model.calls - calls + self._saved_calls
         return QuestionResult(reply["status"], reply["object_id"] or "", calls, ms)
 
-    def by_mode(self, scene: QuestionScene, asked: AskedQuestion, mode: str) -> dict[str, Any]:
+    def by_mode(self, scene: QuestionScene, asked: HouseQuestion, mode: str) -> dict[str, Any]:
         """The answer of one of the product's modes."""
         return self.reasoner.answer(scene.graph, 0, scene.question(asked, mode))
 
     def by_program(
-        self, scene: QuestionScene, asked: AskedQuestion, program: Program, graph: SceneGraph | None = None
+        self, scene: QuestionScene, asked: HouseQuestion, program: Program, graph: SceneGraph | None = None
     ) -> dict[str, Any]:
         """The answer to a program that is given."""
         return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(asked), program)
 
-    def program(self, asked: AskedQuestion, how: str = "adapter") -> Program:
+    def program(self, asked: HouseQuestion, how: str = "adapter") -> Program:
         """What the model reads: with the adapter, without, or without but with examples before the request."""
         key = (how, asked.text)
         if key in self._read:
@@ -138,7 +140,7 @@ class Variant:
     """One way to answer, in words and as a function."""
 
     description: str
-    answer: Callable[[VariantRunner, QuestionScene, AskedQuestion], dict[str, Any]]
+    answer: Callable[[VariantRunner, QuestionScene, HouseQuestion], dict[str, Any]]
 
 
 VARIANTS: Mapping[str, Variant] = {
@@ -172,7 +174,7 @@ def chosen_variants(names: str) -> list[str]:
     return chosen
 
 
-def true_program(asked: AskedQuestion) -> Program:
+def true_program(asked: HouseQuestion) -> Program:
     """The program that the question was made from."""
     return Program(target=read(asked.program))
 

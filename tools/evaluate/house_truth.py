@@ -28,14 +28,14 @@ from placegraph.tools.evaluate.place_name_scores import place_name_scores
 from placegraph.tools.evaluate.trajectory_error import level_alignment, paired
 from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph
 from placegraph.tools.map_files.trajectory_file import read_trajectory
-from placegraph.tools.simulator.classes import CLASSES
-from placegraph.tools.simulator.space import inside
-from placegraph.tools.simulator.truth import Seen, TrueLocation, Truth, read_truth
+from placegraph.tools.simulator.ground_truth import FrameCounts, TrueLocation, Truth, read_truth
+from placegraph.tools.simulator.object_classes import CLASSES
+from placegraph.tools.simulator.occupancy_grid import points_in_polygon
 
 MIN_FRAMES = 5  # an object was seen well when it was clear in so many frames; chosen by hand
 MIN_SHARE = 0.5  # of a location's members that the walk must have seen well; chosen by hand
 MIN_HEIGHT_M = 1.0  # of a camera over its floor: on the stairs it rises above a storey before the feet do
-HOUSE_VOCABULARY = ClassVocabulary({cls.name: (*cls.said[1:], *cls.unsaid) for cls in CLASSES})
+HOUSE_VOCABULARY = ClassVocabulary({cls.name: (*cls.training_words[1:], *cls.held_out_words) for cls in CLASSES})
 
 
 def house_scores(folder: Path, source: Path, given: Mapping[int, F64] | None, questions: bool) -> dict[str, Any]:
@@ -65,7 +65,7 @@ def house_scores(folder: Path, source: Path, given: Mapping[int, F64] | None, qu
 
 
 def house_ground_truth(
-    truth: Truth, seen: Sequence[Seen], positions: F64, trajectory: Mapping[int, F64] | None = None
+    truth: Truth, seen: Sequence[FrameCounts], positions: F64, trajectory: Mapping[int, F64] | None = None
 ) -> GroundTruth:
     """The truth of a house after a walk through camera positions (N, 3) that saw the objects as `seen`, by id.
 
@@ -84,7 +84,7 @@ def house_ground_truth(
     def entered(outline: F64, floor: int) -> bool:
         height = positions[:, 2] - truth.floors[floor].z_m
         on_floor = positions[(height > MIN_HEIGHT_M) & (height < truth.floors[floor].height_m)]
-        return bool(inside(outline, on_floor[:, :2]).any())
+        return bool(points_in_polygon(outline, on_floor[:, :2]).any())
 
     floor_of_room = {room.id: room.floor for room in truth.rooms}
     return GroundTruth(
@@ -106,7 +106,7 @@ def house_ground_truth(
     )
 
 
-def visibility_of(seen: Seen) -> Visibility:
+def visibility_of(seen: FrameCounts) -> Visibility:
     """How well the walk saw an object."""
     if seen.clear_frames >= MIN_FRAMES:
         return "well"

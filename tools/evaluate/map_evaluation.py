@@ -18,7 +18,7 @@ from placegraph.tools.evaluate.trajectory_error import at_times, level_alignment
 from placegraph.tools.evaluate.truth_file import read_truth_file, write_truth_file
 from placegraph.tools.evaluate.walk_quarters import walk_quarter_scores
 from placegraph.tools.map_files.map_folder import TRAJECTORY
-from placegraph.tools.simulator.truth import TRUTH, read_truth
+from placegraph.tools.simulator.ground_truth import TRUTH, read_truth
 
 
 def source_scores(folder: Path, source: Path, questions: bool = False) -> dict[str, Any]:

@@ -23,14 +23,14 @@ from placegraph.tools.evaluate.box_average_precision import DetectedBoxes, TrueB
 from placegraph.tools.evaluate.evaluation_views import evaluation_views
 from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY
 from placegraph.tools.evaluate.mask_iou import mask_overlaps
-from placegraph.tools.simulator.classes import CLASSES, NAMES
-from placegraph.tools.training.samples import Shard
+from placegraph.tools.simulator.object_classes import CLASSES, NAMES
+from placegraph.tools.training.data_augmentation import Shard
 
 FAMILIES = "placegraph.models_onnx"
 MIN_SCORE = 0.01  # instead of a run's own threshold: average precision needs the order of all detections
 # The first synonym of each class that no training used as a prompt; its name where there is none.
-UNTRAINED_SYNONYMS = tuple(cls.unsaid[0] if cls.unsaid else cls.name for cls in CLASSES)
-HAS_UNTRAINED_SYNONYM = np.array([bool(cls.unsaid) for cls in CLASSES])
+UNTRAINED_SYNONYMS = tuple(cls.held_out_words[0] if cls.held_out_words else cls.name for cls in CLASSES)
+HAS_UNTRAINED_SYNONYM = np.array([bool(cls.held_out_words) for cls in CLASSES])
 CLASS_OF_WORD = {word: NAMES.index(name) for word, name in HOUSE_VOCABULARY.class_of_word.items()}
 
 

@@ -15,8 +15,8 @@ import typer
 from placegraph.tools.evaluate.evaluation_views import EvaluationView, evaluation_shards, evaluation_views
 from placegraph.tools.evaluate.network_scores import NetworkNames, Networks, network_scores
 from placegraph.tools.evaluate.report import number, plain, table
-from placegraph.tools.simulator.classes import NAMES
-from placegraph.tools.training.samples import Shard
+from placegraph.tools.simulator.object_classes import NAMES
+from placegraph.tools.training.data_augmentation import Shard
 
 TIMED_VIEWS = 24  # after one that warms up
 THREADS = (1, 2)

@@ -12,7 +12,7 @@ from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.aligned_map import AlignedMap, MapPlace
 from placegraph.tools.evaluate.layer_scores import UNKNOWN_FLOOR
 from placegraph.tools.evaluate.place_overlap import Area, AreaOverlaps, match_floors, overlaps, ratio
-from placegraph.tools.simulator.truth import Truth
+from placegraph.tools.simulator.ground_truth import Truth
 
 MIN_INSIDE = 0.5  # of a map place that must lie in one true place; otherwise it is of no single kind and not judged
 MAX_NAMES = 3

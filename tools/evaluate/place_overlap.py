@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from placegraph.runtime.arrays import F64, I64, Bool
-from placegraph.tools.simulator.space import inside
+from placegraph.tools.simulator.occupancy_grid import points_in_polygon
 
 CELL_M = 0.05
 BOUNDARY_M = 0.5  # within which both heights of a floor must lie, as in HOV-SG
@@ -65,7 +65,7 @@ def _rasterize(outline: F64, cell_m: float) -> AreaRaster:
     low = np.floor(outline.min(axis=0) / cell_m).astype(np.int64)
     count = np.ceil(outline.max(axis=0) / cell_m).astype(np.int64) - low
     grid = np.stack(np.meshgrid(np.arange(count[0]), np.arange(count[1]), indexing="ij"), axis=-1)
-    return low, inside(outline, (grid + low + 0.5) * cell_m)
+    return low, points_in_polygon(outline, (grid + low + 0.5) * cell_m)
 
 
 def _shared_cells(a: AreaRaster, b: AreaRaster) -> int:

@@ -20,7 +20,7 @@ from placegraph.tools.evaluate.house_truth import house_ground_truth
 from placegraph.tools.evaluate.layer_scores import map_scores
 from placegraph.tools.evaluate.place_overlap import ratio
 from placegraph.tools.evaluate.trajectory_error import against_given, level_alignment, paired
-from placegraph.tools.simulator.truth import CLEAR_SHARE, TRUTH, Seen, Truth, read_truth
+from placegraph.tools.simulator.ground_truth import CLEAR_SHARE, TRUTH, FrameCounts, Truth, read_truth
 from placegraph.tools.view import RECORDING
 
 QUARTERS = (0.25, 0.5, 0.75, 1.0)  # of the frames
@@ -110,7 +110,9 @@ def _age(graph: Graph) -> tuple[int, bool]:
     return graph.revision, graph.named
 
 
-def _seen_after(source: Path, truth: Truth, stamps: list[int], frame_counts: list[int]) -> list[tuple[Seen, ...]]:
+def _seen_after(
+    source: Path, truth: Truth, stamps: list[int], frame_counts: list[int]
+) -> list[tuple[FrameCounts, ...]]:
     """How each object was seen in the first frames, for each of these numbers of frames."""
     if len(stamps) != truth.house.frames:
         raise SourceError(
@@ -119,9 +121,11 @@ def _seen_after(source: Path, truth: Truth, stamps: list[int], frame_counts: lis
     pixels = np.array([_object_pixels(source, index, len(truth.objects)) for index in range(max(frame_counts))])
     clear = pixels >= CLEAR_SHARE * truth.house.width * truth.house.height
 
-    def seen(count: int) -> tuple[Seen, ...]:
+    def seen(count: int) -> tuple[FrameCounts, ...]:
         frames, clear_frames = (mask[:count].sum(axis=0).tolist() for mask in (pixels > 0, clear))
-        return tuple(Seen(*counts) for counts in zip(range(len(truth.objects)), frames, clear_frames, strict=True))
+        return tuple(
+            FrameCounts(*counts) for counts in zip(range(len(truth.objects)), frames, clear_frames, strict=True)
+        )
 
     return [seen(count) for count in frame_counts]
 

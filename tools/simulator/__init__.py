@@ -1,1 +1,1 @@
-"""The house: procedural multi-floor buildings with everything that is true about them, all from one seed."""
+"""A simulator: furnished multi-floor houses from a seed, rendered RGB-D frames, ground truth and questions."""

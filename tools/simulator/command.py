@@ -1,4 +1,4 @@
-"""Make a house: a furnished building from a seed, filmed on a walk through it, as a folder to map and to score."""
+"""`placegraph house`: generate a furnished house from a seed and film it, as a folder to map and to score."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.simulator.export import HouseOrder, export
-from placegraph.tools.simulator.truth import HouseRun, read_house_run
+from placegraph.tools.simulator.ground_truth import HouseRun, read_house_run
+from placegraph.tools.simulator.tum_export import HouseOrder, export
 
 
 def house(
@@ -30,18 +30,20 @@ def house(
 ) -> None:
     """Make a house and film it; `placegraph run CONFIG --source OUT` maps it."""
     order = HouseOrder(seed, floors, limit, width, width * 3 // 4, moved)
-    made = _already_there(out, order, replace)
-    run = made or export(order, out, workers, quiet)
+    existing = _already_there(out, order, replace)
+    run = existing or export(order, out, workers, quiet)
     size = f"{run.width}x{run.height}"
-    print(f"\n{'it is there already' if made else 'written'}  {out}: {run.frames} frames of {size}, seed {run.seed}")
+    print(
+        f"\n{'it is there already' if existing else 'written'}  {out}: {run.frames} frames of {size}, seed {run.seed}"
+    )
     print(f"plan     {out / 'plan.png'}\ntruth    {out / 'truth'}")
     print(f"map it   placegraph run configs/demo.toml --source {out}")
 
 
 def _already_there(out: Path, order: HouseOrder, replace: bool) -> HouseRun | None:
-    """What made the folder when it is just what is asked for; None when there is nothing; raises ConfigError else.
+    """The run of an existing folder that matches the order; None when there is no folder yet.
 
-    `replace`: another house folder, whole or not, is removed; anything else never is.
+    `replace` removes another house folder, complete or not. Raises ConfigError when `out` holds anything else.
     """
     if out.is_dir() and any(out.iterdir()):
         run = read_house_run(out)

@@ -1,7 +1,7 @@
-"""Pictures of a house: one ray per pixel into an Embree scene, with the light of the house baked into its triangles.
+"""Renders a house: one ray per pixel into an Embree scene, with baked light.
 
-Everything slow happens once per house (mesh.py, light.py). A frame then costs the rays, a dozen table lookups per pixel
-and one bilinear lookup in the texture atlas.
+Everything slow happens once per house (house_mesh.py, light_baking.py). A frame then costs the rays, a dozen table
+lookups per pixel and one bilinear lookup in the texture atlas.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from embreex.rtcore_scene import EmbreeScene
 
 from placegraph.runtime.arrays import F32, F64, I64, U8
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.simulator.light import baked, nearest_lamps
-from placegraph.tools.simulator.mesh import Mesh, mesh_of
-from placegraph.tools.simulator.model import House, Material
-from placegraph.tools.simulator.sensor import View
-from placegraph.tools.simulator.textures import LEVEL_LEFT_PX, LEVEL_SIZES_PX, LEVELS, atlas
+from placegraph.tools.simulator.camera_sensor import RenderedView
+from placegraph.tools.simulator.house_mesh import HouseMesh, house_mesh
+from placegraph.tools.simulator.house_model import House, Material
+from placegraph.tools.simulator.light_baking import bake_light, nearest_lamps
+from placegraph.tools.simulator.texture_atlas import LEVEL_LEFT_PX, LEVEL_SIZES_PX, LEVELS, atlas
 
-_BAND_ROWS = 32  # so many rows at a time: the intermediate arrays stay in the processor's cache
+_BAND_ROWS = 32  # rows per band: intermediate arrays stay in the processor's cache
 
 
 class Renderer:
@@ -31,18 +31,18 @@ class Renderer:
         self.width, self.height = width, height
         focal_px = width / 2 / np.tan(horizontal_fov / 2)
         self.intrinsics: F64 = np.array([focal_px, focal_px, (width - 1) / 2, (height - 1) / 2])
-        materials, mesh = mesh_of(house)
+        materials, mesh = house_mesh(house)
         self._texels = atlas(materials)
         self._scene = EmbreeScene()
         world = np.ascontiguousarray(mesh.corners[..., :3], np.float32)
         self._embree_mesh = TriangleMesh(self._scene, world)
-        self._tabulate(mesh, materials)
-        self._light(house, mesh, materials)
+        self._build_tables(mesh, materials)
+        self._bake_lighting(house, mesh, materials)
         fx, fy, cx, cy = self.intrinsics
         self._across = ((np.arange(width) - cx) / fx).astype(np.float32)[:, None]  # a pixel's ray: (across, down, 1)
         self._down = ((np.arange(height) - cy) / fy).astype(np.float32)[:, None]
 
-    def render(self, world_from_camera: F64) -> View:
+    def render(self, world_from_camera: F64) -> RenderedView:
         """The house seen from a (4, 4) pose; camera frame x right, y down, z forward, metres.
 
         Raises:
@@ -54,16 +54,16 @@ class Renderer:
         eye = world_from_camera[:3, 3].astype(np.float32)
         shape = (self.height, self.width)
         color, shine = np.empty((*shape, 3), np.uint8), np.empty(shape, np.uint8)
-        view = View(color, np.empty(shape, np.float32), np.empty(shape, np.uint16), shine)
+        view = RenderedView(color, np.empty(shape, np.float32), np.empty(shape, np.uint16), shine)
         blur = self._blur_per_m(eye)
         for top in range(0, self.height, _BAND_ROWS):
             self._render_band(view, slice(top, min(top + _BAND_ROWS, self.height)), turn, eye, blur)
         return view
 
-    def _tabulate(self, mesh: Mesh, materials: list[Material]) -> None:
-        """What a pixel looks up by its triangle; the last row, found by index -1, is for rays that hit nothing."""
-        gloss = np.array([one.gloss for one in materials])[mesh.material]
-        glow = np.array([one.glow for one in materials])[mesh.material]
+    def _build_tables(self, mesh: HouseMesh, materials: list[Material]) -> None:
+        """Per-triangle tables; the last row, index -1, is for rays that hit nothing."""
+        gloss = np.array([material.gloss for material in materials])[mesh.material]
+        glow = np.array([material.glow for material in materials])[mesh.material]
         world, uv = mesh.corners[..., :3], mesh.corners[..., 3:5]
         normal = np.cross(world[:, 1] - world[:, 0], world[:, 2] - world[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
@@ -73,35 +73,35 @@ class Renderer:
         self._normal = _columns(np.append(normal, [[0, 0, 1]], axis=0))
         self._middle = _columns(np.append(world.mean(axis=1), [[0, 0, 0]], axis=0))
         origin = self._texels.origins_px[mesh.material]
-        self._uv = [_affine(uv[..., k] - np.floor(uv[:, :1, k])) for k in range(2)]
+        self._uv = [_affine_table(uv[..., k] - np.floor(uv[:, :1, k])) for k in range(2)]
         self._origin = _columns(np.append(origin, [[0, 0]], axis=0))
         # the level of detail is rounded to the nearest, hence the root of two
         blur = mesh.texels_per_m * np.sqrt(2) / self.intrinsics[0]
         self._texels_per_px_m = np.append(blur, 0).astype(np.float32)
 
-    def _light(self, house: House, mesh: Mesh, materials: list[Material]) -> None:
-        """Bake the light at the corners and choose its colour, which varies with the house's seed."""
-        glow = np.array([one.glow for one in materials])[mesh.material][:, None]
+    def _bake_lighting(self, house: House, mesh: HouseMesh, materials: list[Material]) -> None:
+        """Bakes the light at the corners and chooses its colour, which varies with the seed."""
+        glow = np.array([material.glow for material in materials])[mesh.material][:, None]
         lamps = nearest_lamps(house, mesh.corners[..., :3].mean(axis=1))[:, 0]
         self._lamp = _columns(np.append(lamps, [[0, 0, 1e3]], axis=0))
-        light = baked(house, self._scene, mesh.corners)
+        light = bake_light(house, self._scene, mesh.corners)
         random = np.random.default_rng([house.seed, 7002])
         light *= random.uniform(0.85, 1.1)
         # stored as sRGB-like values: products of encoded colour and encoded light need no power per pixel
         encoded = np.clip(light, 0.02, 1.35) ** (1 / 2.2)
-        self._shade = _affine(encoded * (1 - glow) + 1.2 * glow)  # what glows outshines the room
+        self._shade = _affine_table(encoded * (1 - glow) + 1.2 * glow)  # emission outshines the room
         warm = random.uniform(-0.5, 1.0)
         lit, dim = np.array([1 + 0.05 * warm, 1.0, 1 - 0.09 * warm]), np.array([0.95, 0.99, 1.04])
         gain = (lit - 0.3 * dim) / 0.7  # light 1 has the lamps' colour, light 0.3 the cooler one of the shadows
         self._tints = list(zip(gain.astype(np.float32), (lit - gain).astype(np.float32), strict=True))
 
     def _blur_per_m(self, eye: F32) -> F32:
-        """Texels per pixel of each triangle at one metre from here; slanted surfaces are a little more blurred."""
+        """Texels per pixel of each triangle at 1 m from the eye; more for slanted surfaces."""
         way = [middle - along for middle, along in zip(self._middle, eye, strict=True)]
         slant = np.abs(_dot(way, self._normal)) / np.sqrt(_dot(way, way) + np.float32(1e-6))
         return np.asarray(self._texels_per_px_m / np.sqrt(np.maximum(slant, np.float32(0.1))), np.float32)
 
-    def _render_band(self, view: View, rows: slice, turn: F32, eye: F32, blur: F32) -> None:
+    def _render_band(self, view: RenderedView, rows: slice, turn: F32, eye: F32, blur: F32) -> None:
         count, shape = (rows.stop - rows.start) * self.width, (rows.stop - rows.start, self.width)
         # sums written out, because a matrix product may round differently with another number of threads
         row_rays = self._down[rows] * turn[:, 1] + turn[:, 2]
@@ -117,24 +117,24 @@ class Renderer:
         size_px = LEVEL_SIZES_PX.take(level)
         place = []
         for k, left in enumerate((LEVEL_LEFT_PX.take(level), np.float32(0))):
-            repeats = _at(self._uv[k], triangle, u, v)
+            repeats = _interpolate(self._uv[k], triangle, u, v)
             pixel = (repeats - np.floor(repeats)) * size_px + left + self._origin[k].take(triangle, mode="wrap")
             place.append(pixel.reshape(shape))
         color = cv2.remap(self._texels.image, place[0], place[1], cv2.INTER_LINEAR)
-        shade = _at(self._shade, triangle, u, v).reshape(shape)
+        shade = _interpolate(self._shade, triangle, u, v).reshape(shape)
         light = cv2.merge([shade * gain + base for gain, base in self._tints])
         color = cv2.multiply(color, light, dtype=cv2.CV_8U)
         highlight = self._highlight(triangle, rays, depth, eye).reshape(shape)
         view.color[rows] = cv2.add(color, cv2.merge((highlight, highlight, highlight)))
 
     def _highlight(self, triangle: I64, rays: F32, depth: F32, eye: F32) -> U8:
-        """(N,) levels to add where glossy surfaces mirror the nearest lamp, or look pale at a grazing view."""
+        """(N,) brightness to add where glossy surfaces mirror the nearest lamp or are seen at a grazing angle."""
         gloss = self._gloss.take(triangle, mode="wrap")
         added = np.zeros(len(gloss), np.uint8)
         glossy = np.flatnonzero(gloss > 0.04)
         which, far, gloss = triangle[glossy], depth[glossy], gloss[glossy]
         way = [rays[:, k].take(glossy) for k in range(3)]
-        normal = [one.take(which, mode="wrap") for one in self._normal]
+        normal = [column.take(which, mode="wrap") for column in self._normal]
         lamp = [self._lamp[k].take(which, mode="wrap") - eye[k] - way[k] * far for k in range(3)]
         to_lamp_m, way_length = np.sqrt(_dot(lamp, lamp)) + np.float32(1e-6), np.sqrt(_dot(way, way))
         facing = _dot(normal, way) / way_length
@@ -145,7 +145,7 @@ class Renderer:
 
 
 def _columns(rows: F64) -> list[F32]:
-    """The columns of a table, each by itself: that much faster than rows to look up and to multiply."""
+    """The columns of a table as separate arrays, which are faster to look up and multiply than rows."""
     return [np.ascontiguousarray(rows[:, k], np.float32) for k in range(rows.shape[1])]
 
 
@@ -154,16 +154,16 @@ def _dot(a: list[F32], b: list[F32]) -> F32:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-def _affine(values: F64) -> tuple[F32, F32, F32]:
+def _affine_table(values: F64) -> tuple[F32, F32, F32]:
     """Corner values (T, 3) as value at the first corner and the steps along the two edges, with a row for no hit."""
     rows = np.stack((values[:, 0], values[:, 1] - values[:, 0], values[:, 2] - values[:, 0]))
     padded = np.pad(rows, ((0, 0), (0, 1))).astype(np.float32)
     return padded[0], padded[1], padded[2]
 
 
-def _at(table: tuple[F32, F32, F32], triangle: I64, u: F32, v: F32) -> F32:
-    """The corner values interpolated at barycentric (u, v) of each pixel's triangle."""
-    base, along_u, along_v = (one.take(triangle, mode="wrap") for one in table)
+def _interpolate(table: tuple[F32, F32, F32], triangle: I64, u: F32, v: F32) -> F32:
+    """Corner values interpolated at barycentric (u, v) of each pixel's triangle."""
+    base, along_u, along_v = (values.take(triangle, mode="wrap") for values in table)
     along_u *= u
     along_v *= v
     base += along_u

@@ -1,1 +1,1 @@
-"""Training of the embedded networks on views of procedural houses: PyTorch on the CPU, with the extra `train`."""
+"""Training of the embedded networks on rendered houses: PyTorch on the CPU, with the extra `train`."""

@@ -1,4 +1,4 @@
-"""`placegraph train`: from houses to the embedded networks, in steps that can be stopped and gone on with."""
+"""`placegraph train`: trains the embedded networks; every step resumes from its checkpoint."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def views(
     ] = False,
 ) -> None:
     """Render the views that the networks are trained on."""
-    from placegraph.tools.training.views import CALIBRATION_SEEDS, TRAINING_SEEDS, render_houses
+    from placegraph.tools.training.view_rendering import CALIBRATION_SEEDS, TRAINING_SEEDS, render_houses
 
     seeds = CALIBRATION_SEEDS if calibration else TRAINING_SEEDS
     if houses > len(seeds):
@@ -40,7 +40,7 @@ def views(
 @app.command()
 def objects(data: Data, work: Work, steps: Steps = 9000, threads: Threads = 2) -> None:
     """Train the detector from nothing, with the dense head from which the tagger is made."""
-    from placegraph.tools.training.objects import train_objects
+    from placegraph.tools.training.detector_training import train_objects
 
     train_objects(data, work / "objects.pt", steps, threads=threads)
 
@@ -57,25 +57,25 @@ def refine(
 ) -> None:
     """Train the objects further on larger images; with --from-package also on views of your own."""
     from placegraph.models_onnx.manifest import find_weights
-    from placegraph.tools.training.fold import folded, packaged_start
-    from placegraph.tools.training.loop import read_average
+    from placegraph.tools.training.batch_norm_folding import fold_batch_norm, packaged_start
+    from placegraph.tools.training.detector_training import refine_objects
     from placegraph.tools.training.networks import ObjectNetwork
-    from placegraph.tools.training.objects import refine_objects
+    from placegraph.tools.training.training_loop import read_average
 
     if from_package:
         start = packaged_start(
             find_weights("house_detector").files["model"], find_weights("house_tagger").files["model"]
         )
     else:
-        start = folded(read_average(work / "objects.pt", ObjectNetwork()))
+        start = fold_batch_norm(read_average(work / "objects.pt", ObjectNetwork()))
     refine_objects(start, data, work / "refined.pt", steps, threads=threads)
 
 
 @app.command()
 def tags(data: Data, work: Work, steps: Steps = 1000, threads: Threads = 2) -> None:
     """Tune the tagger; needs the refined objects."""
-    from placegraph.tools.training.objects import read_refined
-    from placegraph.tools.training.tags import train_tagger
+    from placegraph.tools.training.detector_training import read_refined
+    from placegraph.tools.training.tagger_training import train_tagger
 
     train_tagger(data, read_refined(work / "refined.pt"), work / "tags.pt", steps, threads=threads)
 
@@ -83,7 +83,7 @@ def tags(data: Data, work: Work, steps: Steps = 1000, threads: Threads = 2) -> N
 @app.command()
 def masks(data: Data, work: Work, steps: Steps = 4000, threads: Threads = 2) -> None:
     """Train the segmenter."""
-    from placegraph.tools.training.masks import train_masks
+    from placegraph.tools.training.segmenter_training import train_masks
 
     train_masks(data, work / "masks.pt", steps, threads=threads)
 
@@ -91,17 +91,17 @@ def masks(data: Data, work: Work, steps: Steps = 4000, threads: Threads = 2) -> 
 @app.command()
 def scans(data: Data, houses: Annotated[int, typer.Option(min=1, help="How many houses.")] = 95) -> None:
     """Simulate what walks through houses leave of their furniture: what the location detector is trained on."""
-    from placegraph.tools.training.locations import write_houses
-    from placegraph.tools.training.views import TRAINING_SEEDS
+    from placegraph.tools.training.location_training import simulate_scans
+    from placegraph.tools.training.view_rendering import TRAINING_SEEDS
 
-    write_houses(TRAINING_SEEDS[:houses], data)
+    simulate_scans(TRAINING_SEEDS[:houses], data)
 
 
 @app.command()
 def locations(data: Data, work: Work, steps: Steps = 3200, threads: Threads = 1) -> None:
     """Train the location detector on scans and write it to WORK/onnx."""
     from placegraph.tools.training.location_export import export_locations
-    from placegraph.tools.training.locations import train_locations
+    from placegraph.tools.training.location_training import train_locations
 
     train_locations(data, work / "locations.pt", steps, threads=threads)
     for file in export_locations(work / "locations.pt", data, work / "onnx"):
@@ -120,7 +120,7 @@ def reader(
     ] = None,
 ) -> None:
     """Train the language model's adapter that reads requests into programs, on generated requests."""
-    from placegraph.tools.training.reader import train_reader
+    from placegraph.tools.training.reader_training import train_reader
 
     train_reader(out, steps, model_path=model, seed=seed, batch=batch, threads=threads)
 
@@ -135,15 +135,15 @@ def evaluate_locations(
     from placegraph.models_onnx import LocationDetector
     from placegraph.models_onnx.load import load, wrong_task
     from placegraph.nodes.hierarchy.locations import LocationConfig
-    from placegraph.tools.training.location_labels import comparison, with_config
-    from placegraph.tools.training.views import EVALUATION_SEEDS
+    from placegraph.tools.training.location_evaluation import comparison, finder_for
+    from placegraph.tools.training.view_rendering import EVALUATION_SEEDS
 
-    finders = {"recipe": with_config(LocationConfig())}
+    finders = {"recipe": finder_for(LocationConfig())}
     for name in model or ["house_locations"]:
         network = load(name, models or [])
         if not isinstance(network, LocationDetector):
-            raise wrong_task("hierarchy", name, network, "find_weights locations")
-        finders[name] = with_config(LocationConfig(model=name), network)
+            raise wrong_task("hierarchy", name, network, "find locations")
+        finders[name] = finder_for(LocationConfig(model=name), network)
     print(comparison(finders, EVALUATION_SEEDS[:houses]))
 
 
@@ -153,7 +153,7 @@ def export(
     calibration: Annotated[Path, typer.Option(help="Views kept aside: `placegraph train views --calibration`.")],
 ) -> None:
     """Write float and INT8 ONNX files of each network trained so far into WORK/onnx, with thresholds and checksums."""
-    from placegraph.tools.training.pack import pack
+    from placegraph.tools.training.network_packaging import package_networks
 
-    for line in pack(work, calibration):
+    for line in package_networks(work, calibration):
         print(line)

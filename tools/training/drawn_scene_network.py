@@ -1,8 +1,8 @@
-"""Fit the drawn scene's network and write models_onnx/embedded/drawn_scene.onnx.
+"""Fits the network of the drawn scene and writes models_onnx/embedded/drawn_scene.onnx.
 
-A pixel's chromaticity and brightness go through one hidden layer of 1x1 convolutions to class logits, which are
-averaged over 3x3 pixels. It is fitted in numpy, in seconds, to frames of the drawn scene with other noise and other
-tints than those it is then measured on. It knows this scene's colours and nothing else.
+Chromaticity and brightness of a pixel go through one hidden layer of 1x1 convolutions to class logits, which are
+averaged over 3x3 pixels. It is fitted in numpy within seconds, to frames with other noise and tints than those it is
+measured on, and works for the colours of this scene only.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     data = arguments.output.read_bytes()
     print(f"{arguments.output}: {len(data)} bytes, sha256 {hashlib.sha256(data).hexdigest()}")
     for seed in TEST_SEEDS:
-        accuracy, by_class = measure(arguments.output, seed)
+        accuracy, by_class = measure_accuracy(arguments.output, seed)
         weakest = min(by_class, key=lambda name: by_class[name])
         mean = sum(by_class.values()) / len(by_class)
         worst = f"{weakest} {by_class[weakest]:.4f}"
@@ -154,7 +154,7 @@ def build(layers: list[F32]) -> bytes:
     return bytes(model.SerializeToString(deterministic=True))
 
 
-def measure(file: Path, seed: int) -> tuple[float, dict[str, float]]:
+def measure_accuracy(file: Path, seed: int) -> tuple[float, dict[str, float]]:
     """Share of right pixels and IoU of each class, over the whole walk at its own size, by the family that runs it."""
     family = FAMILY(Weights("drawn_scene", "semantic", {"model": file}, CLASSES, {}), 1)
     source = SOURCE(Path(), {"seed": seed, "frames": 50})

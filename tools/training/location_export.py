@@ -1,4 +1,4 @@
-"""The trained location network to float and INT8 ONNX in the layout that models_onnx/yolo_locations.py reads."""
+"""Exports the trained location network to float and INT8 ONNX in the layout of models_onnx/yolo_locations.py."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import torch
 
 from placegraph.nodes.hierarchy.birds_eye_view import SIZE_PX
-from placegraph.tools.training.export import Feeds, export, image_feed, quantise
 from placegraph.tools.training.location_network import LocationExport, LocationNetwork
-from placegraph.tools.training.locations import LocationSamples
-from placegraph.tools.training.loop import read_average
+from placegraph.tools.training.location_training import LocationSamples
+from placegraph.tools.training.onnx_export import Feeds, export_onnx, image_feed, quantise
+from placegraph.tools.training.training_loop import read_average
 
 NAME = "house_locations"
 CALIBRATION_IMAGES = 200
@@ -30,7 +30,7 @@ def export_locations(checkpoint: Path, data: Path, folder: Path) -> tuple[Path, 
     """Write FOLDER/float/house_locations.onnx and FOLDER/house_locations.onnx (INT8, ranges from scans of `data`)."""
     trained = read_average(checkpoint, LocationNetwork())
     assert isinstance(trained, LocationNetwork)
-    float_file = export(
+    float_file = export_onnx(
         LocationExport(trained, SIZE_PX),
         {"images": torch.rand(1, 3, SIZE_PX, SIZE_PX)},
         ["output0", "output1"],

@@ -1,7 +1,7 @@
-"""The location network in PyTorch, and its losses.
+"""The location network in PyTorch and its losses.
 
-Source: YOLOv8-seg's head (boxes, class, mask coefficients over shared prototypes) on a backbone of the same blocks as
-the other embedded networks; task-aligned assignment as in detection.py; masks by cross entropy in the box and dice.
+Source: the head of YOLOv8-seg (boxes, class, mask coefficients over shared prototypes) on a backbone of the same blocks
+as the other embedded networks; assignment as in detection_losses.py; masks by cross entropy in the box and dice.
 """
 
 from __future__ import annotations
@@ -12,18 +12,19 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from placegraph.tools.training.detection import assign, ciou
+from placegraph.tools.training.detection_losses import assign_anchors, ciou
 from placegraph.tools.training.networks import Conv, Csp, PooledPyramid, anchors
 
-PROTOTYPES = 32  # the YOLO-seg layout has so many
+PROTOTYPES = 32  # as in the YOLO-seg layout
 WIDTHS = (64, 80, 96)  # of the features at strides 8, 16, 32
 BOX_WEIGHT, CLASS_WEIGHT, MASK_WEIGHT, DICE_WEIGHT = 2.5, 1.0, 1.5, 1.5
-MAX_MASKS = 64  # anchors of a batch that learn their masks in one step; bounds its time
+MAX_MASKS = 64  # anchors per batch with a mask loss; bounds the time of a step
 
 
 class LocationNetwork(nn.Module):
-    """Bird's-eye image (B, 3, H, W), 0..1, to raw distances (B, 4, A), logits (B, 1, A), coefficients (B, 32, A) and
-    prototypes (B, 32, H / 4, W / 4).
+    """Bird's-eye image (B, 3, H, W), 0..1, to boxes and masks of locations.
+
+    Outputs raw distances (B, 4, A), logits (B, 1, A), coefficients (B, 32, A) and prototypes (B, 32, H / 4, W / 4).
     """
 
     def __init__(self) -> None:
@@ -51,11 +52,11 @@ class LocationNetwork(nn.Module):
         c8 = self.to8(c4)
         c16 = self.to16(c8)
         c32 = self.to32(c16)
-        p16 = self.down16(torch.cat((_double(c32), c16), 1))
-        p8 = self.down8(torch.cat((_double(p16), c8), 1))
+        p16 = self.down16(torch.cat((_upsample(c32), c16), 1))
+        p8 = self.down8(torch.cat((_upsample(p16), c8), 1))
         n16 = self.join16(torch.cat((self.up16(p8), p16), 1))
         n32 = self.join32(torch.cat((self.up32(n16), c32), 1))
-        prototypes = self.prototypes(torch.cat((_double(p8), c4), 1))
+        prototypes = self.prototypes(torch.cat((_upsample(p8), c4), 1))
         raw = torch.cat([head(f).flatten(2) for head, f in zip(self.heads, (p8, n16, n32), strict=True)], 2)
         return raw[:, :4], raw[:, 4:5], raw[:, 5:], prototypes
 
@@ -80,40 +81,52 @@ class LocationExport(nn.Module):
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
-    """What one image of a batch shows: boxes (M, 4) px, and masks (M, S / 4, S / 4) 0..1."""
+class LocationTargets:
+    """Targets of one image: boxes (M, 4) px, and masks (M, S / 4, S / 4) 0..1."""
 
     boxes: Tensor
     masks: Tensor
 
 
-def losses(outputs: tuple[Tensor, Tensor, Tensor, Tensor], shown: list[Shown], size_px: int) -> dict[str, Tensor]:
+def losses(
+    outputs: tuple[Tensor, Tensor, Tensor, Tensor], shown: list[LocationTargets], size_px: int
+) -> dict[str, Tensor]:
     """Weighted losses by name."""
     distances, logits, coefficients, prototypes = (part.float() for part in outputs)
     centres, strides = anchors(size_px, size_px)
     reach = functional.softplus(distances) * strides
-    found = torch.cat((centres.T - reach[:, :2], centres.T + reach[:, 2:]), 1).transpose(1, 2)  # (B, A, 4)
+    predicted_boxes = torch.cat((centres.T - reach[:, :2], centres.T + reach[:, 2:]), 1).transpose(1, 2)  # (B, A, 4)
     scores = torch.sigmoid(logits).transpose(1, 2)
-    wanted = torch.zeros_like(scores)
+    target_scores = torch.zeros_like(scores)
     box_loss, total = torch.zeros(()), torch.zeros(())
     mask_losses: list[Tensor] = []
-    for k, one in enumerate(shown):
-        if not len(one.boxes):
+    for k, image_targets in enumerate(shown):
+        if not len(image_targets.boxes):
             continue
-        none = torch.zeros(len(one.boxes), dtype=torch.long)
-        owner, quality = assign(found[k].detach(), scores[k].detach().T, one.boxes, none, centres)
-        mine = torch.nonzero(owner >= 0)[:, 0]
-        if not len(mine):
+        none = torch.zeros(len(image_targets.boxes), dtype=torch.long)
+        owner, quality = assign_anchors(
+            predicted_boxes[k].detach(), scores[k].detach().T, image_targets.boxes, none, centres
+        )
+        assigned = torch.nonzero(owner >= 0)[:, 0]
+        if not len(assigned):
             continue
-        wanted[k, mine, 0] = quality[mine]
-        box_loss = box_loss + ((1 - ciou(found[k, mine], one.boxes[owner[mine]])) * quality[mine]).sum()
-        total = total + quality[mine].sum()
-        best = mine[torch.argsort(-quality[mine], stable=True)[: MAX_MASKS // len(shown) + 1]]
+        target_scores[k, assigned, 0] = quality[assigned]
+        box_loss = (
+            box_loss
+            + ((1 - ciou(predicted_boxes[k, assigned], image_targets.boxes[owner[assigned]])) * quality[assigned]).sum()
+        )
+        total = total + quality[assigned].sum()
+        best = assigned[torch.argsort(-quality[assigned], stable=True)[: MAX_MASKS // len(shown) + 1]]
         mask_losses.append(
-            _masks(coefficients[k][:, best].T, prototypes[k], one.masks[owner[best]], one.boxes[owner[best]])
+            _mask_losses(
+                coefficients[k][:, best].T,
+                prototypes[k],
+                image_targets.masks[owner[best]],
+                image_targets.boxes[owner[best]],
+            )
         )
     total = torch.clamp(total, min=1.0)
-    class_loss = functional.binary_cross_entropy_with_logits(logits.transpose(1, 2), wanted, reduction="sum")
+    class_loss = functional.binary_cross_entropy_with_logits(logits.transpose(1, 2), target_scores, reduction="sum")
     entropy, dice = torch.cat(mask_losses, 1).mean(1) if mask_losses else torch.zeros(2)
     return {
         "box": BOX_WEIGHT * box_loss / total,
@@ -123,7 +136,7 @@ def losses(outputs: tuple[Tensor, Tensor, Tensor, Tensor], shown: list[Shown], s
     }
 
 
-def _masks(coefficients: Tensor, prototypes: Tensor, masks: Tensor, boxes: Tensor) -> Tensor:
+def _mask_losses(coefficients: Tensor, prototypes: Tensor, masks: Tensor, boxes: Tensor) -> Tensor:
     """(2, K) cross entropy and dice of K anchors' masks, within a margin around their boxes (K, 4) px."""
     logits = torch.tensordot(coefficients, prototypes, dims=1)  # (K, h, w)
     line = torch.arange(masks.shape[-1]) + 0.5
@@ -136,5 +149,5 @@ def _masks(coefficients: Tensor, prototypes: Tensor, masks: Tensor, boxes: Tenso
     return torch.stack(((entropy * inside).sum((1, 2)) / inside.sum((1, 2)), dice))
 
 
-def _double(x: Tensor) -> Tensor:
+def _upsample(x: Tensor) -> Tensor:
     return functional.interpolate(x, scale_factor=2.0, mode="nearest")

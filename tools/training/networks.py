@@ -1,7 +1,7 @@
 """The embedded networks in PyTorch: a small backbone with a feature pyramid, and a head for each task.
 
-Blocks follow YOLOv8 (C2f, SPPF, PAN) with ReLU in place of SiLU: it costs nothing in INT8. Text meets pixels as in
-YOLO-World's contrastive head: a projected word vector times each cell's embedding.
+Blocks follow YOLOv8 (C2f, SPPF, PAN) with ReLU in place of SiLU, which costs nothing in INT8. Text is compared with
+pixels as in YOLO-World's contrastive head: a projected word vector times the embedding of each cell.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from placegraph.tools.training.words import EMBEDDING, KnownWords, Words
+from placegraph.tools.training.word_projection import EMBEDDING, WordProjection, WordTable
 
 STRIDES = (8, 16, 32)
 
@@ -96,8 +96,8 @@ class Backbone(nn.Module):
         c8 = self.to8(self.stem(image))
         c16 = self.to16(c8)
         c32 = self.to32(c16)
-        p16 = self.down16(torch.cat((_double(c32), c16), 1))
-        p8 = self.down8(torch.cat((_double(p16), c8), 1))
+        p16 = self.down16(torch.cat((_upsample(c32), c16), 1))
+        p8 = self.down8(torch.cat((_upsample(p16), c8), 1))
         n16 = self.join16(torch.cat((self.up16(p8), p16), 1))
         n32 = self.join32(torch.cat((self.up32(n16), c32), 1))
         return [p8, n16, n32]
@@ -120,15 +120,15 @@ class TextHead(nn.Module):
 
 
 class ObjectNetwork(nn.Module):
-    """Detector, with a dense head beside it from which the tagger is made.
+    """Detector with a dense head, from which the tagger is made.
 
-    The dense head names the object at each stride-8 cell; it teaches the backbone from every pixel.
+    The dense head names the object at each stride-8 cell, so that the backbone learns from every pixel.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.backbone = Backbone()
-        self.words: Words | KnownWords = Words()
+        self.words: WordProjection | WordTable = WordProjection()
         self.boxes = nn.ModuleList(nn.Sequential(Conv(c, 64), nn.Conv2d(64, 4, 1)) for c in Backbone.WIDTHS)
         self.texts = nn.ModuleList(TextHead(c) for c in Backbone.WIDTHS)
         self.dense = TextHead(Backbone.WIDTHS[0])
@@ -146,7 +146,7 @@ class ObjectNetwork(nn.Module):
         return distances, logits, self.dense(features[0], words)
 
 
-class Detector(nn.Module):
+class DetectorExport(nn.Module):
     """ObjectNetwork in the YOLO-World export layout, for one input size."""
 
     def __init__(self, network: ObjectNetwork, height: int, width: int) -> None:
@@ -164,11 +164,11 @@ class Detector(nn.Module):
         return torch.cat(((low + high) / 2, high - low, torch.sigmoid(logits)), dim=1)
 
 
-class Tagger(nn.Module):
-    """An ObjectNetwork without its boxes, with fixed words: logits of the whole image, RAM++ layout.
+class TaggerNetwork(nn.Module):
+    """An ObjectNetwork without boxes, with fixed words: logits of the whole image, RAM++ layout.
 
-    The logit of a tag joins a smooth maximum over the dense head's cells and one over the detector's anchors: together
-    they name more than either. Input is ImageNet-normalised.
+    The logit of a tag combines a smooth maximum over the cells of the dense head with one over the anchors of the
+    detector. Input is ImageNet-normalised.
     """
 
     def __init__(self, network: ObjectNetwork, text: Tensor) -> None:
@@ -191,7 +191,7 @@ class Tagger(nn.Module):
 
 
 class MaskEncoder(nn.Module):
-    """Image and depth to an embedding that is read once for all boxes of a frame."""
+    """Image and depth to an embedding that is shared by all boxes of a frame."""
 
     CHANNELS = 40
 
@@ -211,17 +211,17 @@ class MaskEncoder(nn.Module):
         c2 = self.to2(torch.cat((image, depth * 0.2, known), 1))
         c4 = self.to4(c2)
         c8 = self.to8(c4)
-        p8 = self.down8(torch.cat((_double(self.to16(c8)), c8), 1))
-        p4 = self.down4(torch.cat((_double(p8), c4), 1))
-        p2 = self.down2(torch.cat((_double(p4), c2), 1))
+        p8 = self.down8(torch.cat((_upsample(self.to16(c8)), c8), 1))
+        p4 = self.down4(torch.cat((_upsample(p8), c4), 1))
+        p2 = self.down2(torch.cat((_upsample(p4), c2), 1))
         return torch.cat((p2, functional.max_pool2d(depth, 2)), 1)
 
 
 class MaskDecoder(nn.Module):
-    """Embedding and boxes to one mask a box, on a grid that covers the box with a margin, and its predicted IoU."""
+    """Embedding and boxes to one mask per box, on a grid that covers the box with a margin, and its predicted IoU."""
 
     GRID = 48
-    MARGIN = 0.08  # of the box's size on each side: what lies outside tells where the object ends
+    MARGIN = 0.08  # share of the box's size added on each side as context
 
     def __init__(self) -> None:
         super().__init__()
@@ -245,12 +245,12 @@ class MaskDecoder(nn.Module):
         e0 = self.enter(cells)
         e1 = self.down(e0)
         e2 = self.deep(e1)
-        d1 = self.up1(torch.cat((_double(e2), e1), 1))
-        d0 = self.up2(torch.cat((_double(d1), e0), 1))
+        d1 = self.up1(torch.cat((_upsample(e2), e1), 1))
+        d0 = self.up2(torch.cat((_upsample(d1), e0), 1))
         return self.mask(d0), torch.sigmoid(self.quality(e2.mean(dim=(2, 3))))
 
     def sample(self, embedding: Tensor, boxes: Tensor) -> Tensor:
-        """What the embedding holds at each box's grid, with depth made relative and the box drawn in."""
+        """The embedding at each box's grid, with depth made relative and the box drawn in."""
         x = boxes[:, 0:1] + (boxes[:, 2:3] - boxes[:, 0:1]) * self.line  # (N, G)
         y = boxes[:, 1:2] + (boxes[:, 3:4] - boxes[:, 1:2]) * self.line
         g = self.GRID
@@ -266,10 +266,10 @@ class MaskDecoder(nn.Module):
         centre = (middle * seen).sum(dim=(2, 3), keepdim=True) / (seen.sum(dim=(2, 3), keepdim=True) + 1e-3)
         relative = torch.clamp(depth - centre, -2.0, 2.0)
         inside = ((self.line >= 0) & (self.line <= 1)).to(depth.dtype)
-        drawn = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
-        # how large the box is tells how coarse the grid is
+        coarse_mask = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
+        # the size of the box gives the resolution of the grid
         size = (boxes[:, 2:] - boxes[:, :2])[:, :, None, None].expand(-1, 2, g, g)
-        return torch.cat((sampled[:, :-1], relative, relative * 4.0, drawn, size), 1)
+        return torch.cat((sampled[:, :-1], relative, relative * 4.0, coarse_mask, size), 1)
 
 
 def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
@@ -282,5 +282,5 @@ def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
     return torch.cat(centres), torch.cat(strides)
 
 
-def _double(x: Tensor) -> Tensor:
+def _upsample(x: Tensor) -> Tensor:
     return functional.interpolate(x, scale_factor=2.0, mode="nearest")

@@ -1,8 +1,8 @@
-"""SmolLM2 as llama.cpp sees it, frozen, with a low-rank adapter on every linear layer that is trained.
+"""SmolLM2 as llama.cpp runs it, frozen, with a trainable low-rank adapter on every linear layer.
 
-Source: LoRA (Hu et al. 2021); METHOD section 10. Departs: the layers are written out here instead of taken from
-transformers and peft: sentences lie behind each other without padding, and q, k, v (gate, up) are one product; two
-cores train several times as fast so, and the weights stay in the order of the GGUF file.
+Source: LoRA (Hu et al. 2021). Not as in transformers and peft, whose layers are not used: sentences are concatenated
+without padding, and q, k, v (gate, up) are one product. This trains several times as fast on two cores, and the weights
+keep the order of the GGUF file.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from torch.nn import functional
 
 from placegraph.runtime.errors import ModelError
 
-RANK = 16  # METHOD section 10: enough for 18 of 20 requests
+RANK = 16  # a trial read 18 of 20 requests with it
 ALPHA = 32.0  # LoRA: twice the rank is the usual choice; the product is scaled by ALPHA / RANK
 # Linear layers that read the same input are computed together.
 GROUPS = (("attn_q", "attn_k", "attn_v"), ("attn_output",), ("ffn_gate", "ffn_up"), ("ffn_down",))
 
 
 class _Adapted(torch.autograd.Function):
-    """x (T, in) times frozen weight (out, in), plus the low-rank part; no gradient of the weight is computed."""
+    """x (T, in) times frozen weight (out, in) plus the low-rank part; the weight gets no gradient."""
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, a: Tensor, b: Tensor) -> Tensor:
@@ -68,7 +68,7 @@ class ReaderNetwork(nn.Module):
     def __init__(self, model_path: Path, dtype: torch.dtype = torch.bfloat16) -> None:
         """Raises ModelError when the file is not such a model."""
         super().__init__()
-        fields, tensors = _read(model_path)
+        fields, tensors = _read_gguf(model_path)
         self.dtype = dtype
         self.layers, self.heads = int(fields["block_count"]), int(fields["attention.head_count"])
         self.key_heads = int(fields["attention.head_count_kv"])
@@ -85,25 +85,25 @@ class ReaderNetwork(nn.Module):
             for i in range(self.layers)
         )
 
-    def forward(self, sentences: Sequence[Sequence[int]], wanted: Tensor) -> Tensor:
-        """Logits (M, vocabulary) at `wanted` (M,), positions among all tokens of all sentences laid end to end."""
+    def forward(self, sentences: Sequence[Sequence[int]], predicted_at: Tensor) -> Tensor:
+        """Logits (M, vocabulary) at positions `predicted_at` (M,) among the concatenated tokens of all sentences."""
         lengths = [len(sentence) for sentence in sentences]
         ids = torch.tensor([token for sentence in sentences for token in sentence])
         longest = max(lengths)
         place = torch.cat([torch.arange(length) + row * longest for row, length in enumerate(lengths)])
-        turn = self._turns(longest)
+        turn = self._rotary_angles(longest)
         x = functional.embedding(ids, self.embedding).float()
         for (attention_norm, inner_norm), (qkv, out, gate_up, down) in zip(self.norms, self.blocks, strict=True):
             heads = self._attend(qkv(self._normed(x, attention_norm)), place, (len(lengths), longest), turn)
             x = x + out(heads)
             gate, up = gate_up(self._normed(x, inner_norm)).chunk(2, dim=1)
             x = x + down(functional.silu(gate) * up)
-        return functional.linear(self._normed(x[wanted], self.last_norm), self.embedding).float()
+        return functional.linear(self._normed(x[predicted_at], self.last_norm), self.embedding).float()
 
     def _normed(self, x: Tensor, weight: Tensor) -> Tensor:
         return functional.rms_norm(x, weight.shape, weight, self.epsilon).to(self.dtype)
 
-    def _turns(self, longest: int) -> Tensor:
+    def _rotary_angles(self, longest: int) -> Tensor:
         """Rotary turns (longest, 1, size / 2), complex; pairs of neighbours turn together, as in llama.cpp's order."""
         size = self.embedding.shape[1] // self.heads
         rates = self.base ** (-torch.arange(0, size, 2, dtype=torch.float64) / size)
@@ -113,18 +113,23 @@ class ReaderNetwork(nn.Module):
     def _attend(self, qkv: Tensor, place: Tensor, shape: tuple[int, int], turn: Tensor) -> Tensor:
         """Causal attention within each sentence: (T, all heads' q, k, v) to (T, width).
 
-        place: (T,) of each token among rows of equal length, where padding only follows: nothing looks ahead at it.
+        place: (T,) position of each token among rows of equal length; padding follows the tokens, so it is never
+        attended.
         """
         rows, longest = shape
         all_heads = self.heads + 2 * self.key_heads
         padded = qkv.new_zeros(rows * longest, qkv.shape[1]).index_copy(0, place, qkv)
         padded = padded.view(rows, longest, all_heads, -1)
-        turned, value = padded.split([self.heads + self.key_heads, self.key_heads], dim=2)
-        pairs = torch.view_as_complex(turned.float().unflatten(-1, (-1, 2)))
-        turned = torch.view_as_real(pairs * turn).flatten(-2).to(self.dtype)
+        random_transform, value = padded.split([self.heads + self.key_heads, self.key_heads], dim=2)
+        pairs = torch.view_as_complex(random_transform.float().unflatten(-1, (-1, 2)))
+        random_transform = torch.view_as_real(pairs * turn).flatten(-2).to(self.dtype)
         # heads that share a key lie behind each other, as further rows: (rows, key heads, shared * longest, size)
-        query = turned[:, :, : self.heads].transpose(1, 2).reshape(rows, self.key_heads, -1, turned.shape[-1])
-        key, value = turned[:, :, self.heads :].transpose(1, 2), value.transpose(1, 2)
+        query = (
+            random_transform[:, :, : self.heads]
+            .transpose(1, 2)
+            .reshape(rows, self.key_heads, -1, random_transform.shape[-1])
+        )
+        key, value = random_transform[:, :, self.heads :].transpose(1, 2), value.transpose(1, 2)
         scores = (query @ key.transpose(2, 3)).view(rows, self.heads, longest, longest)
         ahead = torch.full((longest, longest), -torch.inf, dtype=self.dtype).triu(1)
         # written out: PyTorch's own attention takes six times as long for sentences this short
@@ -133,7 +138,7 @@ class ReaderNetwork(nn.Module):
         return mixed.transpose(1, 2).reshape(rows * longest, -1)[place]
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+def _read_gguf(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Settings of the family and dequantised tensors of a GGUF file."""
     import gguf
 

@@ -6,7 +6,7 @@ import pytest
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Connection, RouteSegment
 from placegraph.tools.evaluate.connection_scores import connection_scores, match_connections, travel_lengths
-from placegraph.tools.simulator.truth import HouseRun, TrueConnection, Truth
+from placegraph.tools.simulator.ground_truth import HouseRun, TrueConnection, Truth
 
 MOVED = np.eye(4)
 MOVED[:3, 3] = (1, 2, 0.5)
@@ -99,9 +99,9 @@ def test_travel_goes_through_any_room_of_the_floor_by_the_shortest_way():
 
 def test_a_truth_without_connections_is_not_scored(cli, tmp_path: Path):
     """Houses made before doors were truth are still scored for all else."""
-    from placegraph.tools.simulator.build import build
-    from placegraph.tools.simulator.truth import read_truth, truth_of, write_truth
+    from placegraph.tools.simulator.ground_truth import read_truth, truth_of, write_truth
+    from placegraph.tools.simulator.house_frames import generate_house
 
-    made = truth_of(build(5, 1), HouseRun(5, 1, 4, 64, 48, "", 4), ())
+    made = truth_of(generate_house(5, 1), HouseRun(5, 1, 4, 64, 48, "", 4), ())
     write_truth(made.__class__(**{**vars(made), "objects": (), "connections": None}), tmp_path)
     assert not (tmp_path / "truth" / "connections.json").exists() and read_truth(tmp_path).connections is None

@@ -12,13 +12,13 @@ from placegraph.tools.evaluate.grounding_scores import (
     grounding_scores,
     read_questions,
 )
-from placegraph.tools.simulator.questions import AskedQuestion, to_json
+from placegraph.tools.simulator.questions import HouseQuestion, to_json
 
 BOX = np.array([[0.0, 0, 0], [1, 1, 1]])
 
 
 def question(form, text="find the chair", viewpoint=None):
-    return AskedQuestion(text, 0, BOX, form, (), 0, 0, viewpoint)
+    return HouseQuestion(text, 0, BOX, form, (), 0, 0, viewpoint)
 
 
 def reply(object_id, status="found", calls=0, ms=2.0):

@@ -15,11 +15,11 @@ from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY, MIN_FRAMES, 
 from placegraph.tools.map_files.map_folder import read_object_clouds
 from placegraph.tools.map_files.ply import write_points
 from placegraph.tools.map_files.trajectory_file import write_trajectory
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.classes import CLASSES
-from placegraph.tools.simulator.export import HouseOrder, export
-from placegraph.tools.simulator.questions import AskedQuestion, to_json
-from placegraph.tools.simulator.truth import Seen, read_truth, truth_of, write_truth
+from placegraph.tools.simulator.ground_truth import FrameCounts, read_truth, truth_of, write_truth
+from placegraph.tools.simulator.house_frames import generate_house
+from placegraph.tools.simulator.object_classes import CLASSES
+from placegraph.tools.simulator.questions import HouseQuestion, to_json
+from placegraph.tools.simulator.tum_export import HouseOrder, export
 
 ORDER = HouseOrder(seed=5, floors=1, limit=4, width=64, height=48)
 MAP_FROM_TRUE = np.eye(4)
@@ -32,8 +32,8 @@ def source(tmp_path_factory):
     """A house folder of few frames whose truth says that every object was seen well."""
     folder = tmp_path_factory.mktemp("house") / "made"
     run = export(ORDER, folder, workers=1)
-    house = build(ORDER.seed, ORDER.floors)
-    seen = tuple(Seen(item.id, MIN_FRAMES, MIN_FRAMES) for item in house.items)
+    house = generate_house(ORDER.seed, ORDER.floors)
+    seen = tuple(FrameCounts(item.id, MIN_FRAMES, MIN_FRAMES) for item in house.items)
     write_truth(truth_of(house, run, seen), folder)
     return folder
 
@@ -168,8 +168,8 @@ def test_questions_are_asked_and_scored(cli, perfect, source, tmp_path) -> None:
     names = [one.class_name for one in truth.objects]
     single = next(one for one in truth.objects if names.count(one.class_name) == 1)
     asked = [
-        AskedQuestion(f"find the {single.class_name}", single.id, single.box, "name", (), single.room, 0),
-        AskedQuestion("find the submarine", 0, truth.objects[0].box, "none", (), 0, 0),
+        HouseQuestion(f"find the {single.class_name}", single.id, single.box, "name", (), single.room, 0),
+        HouseQuestion("find the submarine", 0, truth.objects[0].box, "none", (), 0, 0),
     ]
     absent = cli("evaluate", perfect, "--source", source, "--questions")
     assert absent.code == 1 and absent.reason.endswith("no questions in truth/questions.json")
@@ -201,8 +201,10 @@ def test_without_truth_the_house_options_are_refused(cli, perfect, source, tmp_p
 
 
 def test_seen_well_needs_frames_and_pixels() -> None:
-    assert visibility_of(Seen(0, 99, MIN_FRAMES)) == "well"
-    assert visibility_of(Seen(0, 99, MIN_FRAMES - 1)) == "poorly" and visibility_of(Seen(0, 0, 0)) == "never"
+    assert visibility_of(FrameCounts(0, 99, MIN_FRAMES)) == "well"
+    assert (
+        visibility_of(FrameCounts(0, 99, MIN_FRAMES - 1)) == "poorly" and visibility_of(FrameCounts(0, 0, 0)) == "never"
+    )
 
 
 def test_every_word_has_one_class() -> None:
@@ -215,7 +217,7 @@ def test_what_the_walk_did_not_show_is_not_asked_for(source) -> None:
     truth = read_truth(source)
     place = next(one for one in truth.locations if len(one.members) >= 3)
     shown = {place.members[0]}
-    seen = [Seen(one.id, 9, 9 if one.id in shown else 0) for one in truth.objects]
+    seen = [FrameCounts(one.id, 9, 9 if one.id in shown else 0) for one in truth.objects]
     nowhere = np.array([[0.0, 0.0, 99.0]])
     known = house_ground_truth(truth, seen, nowhere)
     assert [one.seen for one in known.floors] == [False]
@@ -291,7 +293,7 @@ def test_a_house_of_which_nothing_was_seen_can_be_told(cli, perfect, source, tmp
     truth = read_truth(source)
     for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
         (tmp_path / name).symlink_to(source / name)
-    write_truth(replace(truth, seen=tuple(Seen(one.id, 0, 0) for one in truth.objects)), tmp_path)
+    write_truth(replace(truth, seen=tuple(FrameCounts(one.id, 0, 0) for one in truth.objects)), tmp_path)
     found = json.loads(cli("evaluate", perfect, "--source", tmp_path, "--json").out)
     assert (found["objects"]["truth"], found["objects"]["recall"], found["locations"]["truth"]) == (0, None, 0)
     assert 0 < found["rooms"]["truth"] < found["rooms"]["of"]  # those that were walked through

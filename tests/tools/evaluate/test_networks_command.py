@@ -22,9 +22,9 @@ from placegraph.tools.evaluate.network_scores import (
     tag_scores,
 )
 from placegraph.tools.evaluate.networks_command import network_times, networks
-from placegraph.tools.simulator.classes import CLASSES, NAMES
-from placegraph.tools.training.samples import MIN_SHARE
-from placegraph.tools.training.views import EVALUATION_SEEDS, visible_boxes
+from placegraph.tools.simulator.object_classes import CLASSES, NAMES
+from placegraph.tools.training.data_augmentation import MIN_SHARE
+from placegraph.tools.training.view_rendering import EVALUATION_SEEDS, visible_boxes
 
 CUP, LAMP, SOFA = NAMES.index("cup"), NAMES.index("lamp"), NAMES.index("sofa")
 ITEM_CLASS = np.array([CUP, LAMP, SOFA, CUP], np.uint8)

@@ -6,7 +6,7 @@ from placegraph.tools.evaluate.aligned_map import MapObject
 from placegraph.tools.evaluate.ground_truth import ClassVocabulary, GroundTruthObject
 from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY
 from placegraph.tools.evaluate.object_scores import object_scores, top_k
-from placegraph.tools.simulator.classes import NAMES
+from placegraph.tools.simulator.object_classes import NAMES
 
 
 def box(x, size=(1.0, 1.0, 1.0), y=0.0):

@@ -7,8 +7,8 @@ from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.tools.evaluate.aligned_map import EMPTY_MAP, AlignedMap, MapPlace
 from placegraph.tools.evaluate.place_name_scores import name_scores, place_name_scores
 from placegraph.tools.evaluate.place_overlap import overlaps
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.truth import HouseRun, Seen, truth_of
+from placegraph.tools.simulator.ground_truth import FrameCounts, HouseRun, truth_of
+from placegraph.tools.simulator.house_frames import generate_house
 
 
 def square(x, side=1.0):
@@ -37,9 +37,9 @@ def test_words_for_the_same_place_are_as_good():
 
 @pytest.fixture(scope="module")
 def house():
-    built = build(3, 2)
+    built = generate_house(3, 2)
     run = HouseRun(3, 2, 0, 64, 48, "", 0)
-    return truth_of(built, run, tuple(Seen(item.id, 0, 0) for item in built.items))
+    return truth_of(built, run, tuple(FrameCounts(item.id, 0, 0) for item in built.items))
 
 
 def test_a_map_like_the_house_has_all_names(house):

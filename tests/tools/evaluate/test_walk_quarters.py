@@ -8,8 +8,8 @@ from placegraph.runtime.recording import RecordingWriter
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.tools.evaluate.house_truth import visibility_of
 from placegraph.tools.evaluate.walk_quarters import recorded_snapshots, walk_quarter_scores
-from placegraph.tools.simulator.export import HouseOrder, export
-from placegraph.tools.simulator.truth import read_truth
+from placegraph.tools.simulator.ground_truth import read_truth
+from placegraph.tools.simulator.tum_export import HouseOrder, export
 
 FRAMES = 8
 

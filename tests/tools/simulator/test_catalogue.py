@@ -5,8 +5,8 @@ import pytest
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.simulator.catalogue import design, designs
-from placegraph.tools.simulator.classes import NAMES
-from placegraph.tools.simulator.model import TEXTURES
+from placegraph.tools.simulator.house_model import TEXTURES
+from placegraph.tools.simulator.object_classes import NAMES
 
 
 def test_there_is_a_design_for_each_class_and_nothing_else() -> None:

@@ -13,15 +13,30 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.tools.simulator.asking.names import NEVER_SAID
-from placegraph.tools.simulator.asking.request import Request
-from placegraph.tools.simulator.asking.scene import scene_of
-from placegraph.tools.simulator.asking.scopes import floor_words
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.classes import CLASSES
-from placegraph.tools.simulator.model import ON_FLOOR, Floor, House, Item, Location, Material, PlacedItem, Room
-from placegraph.tools.simulator.questions import AskedQuestion, from_json, questions, requests_by_form, to_json
-from placegraph.tools.simulator.shapes import block
+from placegraph.tools.simulator.house_frames import generate_house
+from placegraph.tools.simulator.house_model import (
+    ON_FLOOR,
+    Floor,
+    FurnitureLocation,
+    House,
+    Item,
+    Material,
+    PlacedItem,
+    Room,
+)
+from placegraph.tools.simulator.mesh_primitives import block
+from placegraph.tools.simulator.object_classes import CLASSES
+from placegraph.tools.simulator.question_generation.class_synonyms import NEVER_SAID
+from placegraph.tools.simulator.question_generation.item_table import item_table
+from placegraph.tools.simulator.question_generation.question_spec import QuestionSpec
+from placegraph.tools.simulator.question_generation.search_scopes import floor_words
+from placegraph.tools.simulator.questions import (
+    HouseQuestion,
+    from_json,
+    generate_questions,
+    questions_by_form,
+    to_json,
+)
 
 SEEDS = (0, 2)
 MATERIAL = Material((90, 90, 90))
@@ -29,12 +44,12 @@ MATERIAL = Material((90, 90, 90))
 
 @cache
 def built(seed: int) -> House:
-    return build(seed, 2)
+    return generate_house(seed, 2)
 
 
 @cache
-def asked_of(seed: int) -> tuple[AskedQuestion, ...]:
-    return tuple(questions(built(seed), seed))
+def asked_of(seed: int) -> tuple[HouseQuestion, ...]:
+    return tuple(generate_questions(built(seed), seed))
 
 
 def square(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
@@ -59,14 +74,14 @@ def one_room(*things: Thing, supports: dict[int, int] | None = None, rooms: int 
     return House(0, (Floor(0, 0.0, 2.6, outline, made, ()),), (), (), tuple(items))
 
 
-def requests(house: House) -> list[Request]:
+def requests(house: House) -> list[QuestionSpec]:
     """All that could be asked, before any is chosen."""
-    found = requests_by_form(scene_of(house), np.random.default_rng(5))
-    return [request for group in found.values() for request in group]
+    found = questions_by_form(item_table(house), np.random.default_rng(5))
+    return [spec for group in found.values() for spec in group]
 
 
 def forms_of(house: House, target: int) -> list[str]:
-    return [request.form for request in requests(house) if request.target.id == target]
+    return [spec.form for spec in requests(house) if spec.target.id == target]
 
 
 def test_of_two_equal_chairs_neither_is_the_chair() -> None:
@@ -76,12 +91,17 @@ def test_of_two_equal_chairs_neither_is_the_chair() -> None:
 
 def test_chair_is_not_said_where_an_armchair_stands_too() -> None:
     found = requests(one_room(thing("chair", 1.5, 3), thing("armchair", 4.5, 3, (0.9, 0.9, 0.9))))
-    unique = [one.target.naming for one in found if one.target.id == 0 and one.form == "unique"]
-    assert not any("chair" in naming.said + naming.unsaid or "seat" in naming.unsaid for naming in unique)
+    unique = [one.target.name_group for one in found if one.target.id == 0 and one.form == "unique"]
+    assert not any(
+        "chair" in name_group.training_words + name_group.held_out_words or "seat" in name_group.held_out_words
+        for name_group in unique
+    )
 
 
 def test_what_is_too_small_to_map_and_rugs_are_no_targets() -> None:
-    assert questions(one_room(thing("cup", 1, 1, (0.08, 0.08, 0.1)), thing("rug", 3, 3, (2, 2, 0.01))), 1) == []
+    assert (
+        generate_questions(one_room(thing("cup", 1, 1, (0.08, 0.08, 0.1)), thing("rug", 3, 3, (2, 2, 0.01))), 1) == []
+    )
 
 
 BED, CAN = thing("bed", 1.2, 3, (1.6, 2.0, 0.9)), thing("trash can", 2.4, 3, (0.3, 0.3, 0.4))  # 0.25 m apart
@@ -113,7 +133,7 @@ def test_rows_are_counted_only_where_all_are_of_one_class(first: str, said: set[
 
 def test_two_alike_bedrooms_are_never_the_bedroom() -> None:
     house = one_room(thing("clock", 3, 3), thing("clock", 10, 3), thing("bed", 1.2, 2, (1.6, 2, 0.9)), rooms=2)
-    texts = [one.text.lower() for one in questions(house, 3, 100) if one.target == 0]
+    texts = [one.text.lower() for one in generate_questions(house, 3, 100) if one.target == 0]
     assert texts and all("bedroom with the" in text for text in texts if "bedroom" in text)
 
 
@@ -130,14 +150,14 @@ def test_on_needs_the_support_not_only_a_place_above() -> None:
 
 def test_location_is_said_once_per_kind() -> None:
     house = one_room(thing("lamp", 1, 1), thing("lamp", 5, 5), thing("sofa", 1, 2, (1.5, 0.8, 0.8)))
-    place = Location(0, "seating area", 0, (0, 2), square(0.25, 0.6, 1.75, 2.4))
-    again = Location(1, "seating area", 0, (1,), square(4.7, 4.7, 5.3, 5.3))
+    place = FurnitureLocation(0, "seating area", 0, (0, 2), square(0.25, 0.6, 1.75, 2.4))
+    again = FurnitureLocation(1, "seating area", 0, (1,), square(4.7, 4.7, 5.3, 5.3))
 
-    def located(*places: Location) -> list[int]:
+    def location_membership(*places: FurnitureLocation) -> list[int]:
         found = requests(House(0, house.floors, (), (), house.items, places))
         return [one.target.id for one in found if one.form == "location"]
 
-    assert set(located(place)) == {0, 2} and located(place, again) == []
+    assert set(location_membership(place)) == {0, 2} and location_membership(place, again) == []
 
 
 def test_a_floor_is_named_without_doubt() -> None:
@@ -145,7 +165,7 @@ def test_a_floor_is_named_without_doubt() -> None:
     assert all("first" not in word for n in (2, 3, 4) for k in range(n) for word in floor_words(k, n))
 
 
-def peers(house: House, one: AskedQuestion) -> list[PlacedItem]:  # each must be ruled out, whatever the room is called
+def peers(house: House, one: HouseQuestion) -> list[PlacedItem]:  # each must be ruled out, whatever the room is called
     name = house.items[one.target].item.name
     return [p for p in house.items if (p.item.name, p.room) == (name, one.room) and p.id != one.target]
 
@@ -155,15 +175,15 @@ def apart_m(a: PlacedItem, b: PlacedItem) -> float:
     return math.sqrt(sum(max(b0[k] - a1[k], a0[k] - b1[k], 0.0) ** 2 for k in range(3)))
 
 
-def side_of(one: AskedQuestion, anchor: PlacedItem, other: PlacedItem) -> complex:
+def side_of(one: HouseQuestion, anchor: PlacedItem, other: PlacedItem) -> complex:
     """Where an item is as seen from the eyes: real is behind the anchor, imaginary to its left."""
     assert one.viewpoint is not None
     eye, at, there = (complex(*point[:2]) for point in (one.viewpoint, anchor.box.mean(axis=0), other.box.mean(axis=0)))
     return (there - at) / ((at - eye) / abs(at - eye))
 
 
-def check_alone(place: Callable[[House, PlacedItem], int]) -> Callable[[House, AskedQuestion], None]:
-    def check(house: House, one: AskedQuestion) -> None:
+def check_alone(place: Callable[[House, PlacedItem], int]) -> Callable[[House, HouseQuestion], None]:
+    def check(house: House, one: HouseQuestion) -> None:
         own = house.items[one.target]
         same = [p.id for p in house.items if p.item.name == own.item.name and place(house, p) == place(house, own)]
         assert same == [one.target]
@@ -171,19 +191,19 @@ def check_alone(place: Callable[[House, PlacedItem], int]) -> Callable[[House, A
     return check
 
 
-def check_on(house: House, one: AskedQuestion) -> None:
+def check_on(house: House, one: HouseQuestion) -> None:
     assert house.items[one.target].support == one.anchors[0]
     assert all(other.support != one.anchors[0] for other in peers(house, one))
 
 
-def check_next_to(house: House, one: AskedQuestion) -> None:
+def check_next_to(house: House, one: HouseQuestion) -> None:
     anchor = house.items[one.anchors[0]]
     assert apart_m(house.items[one.target], anchor) <= 0.4
     assert all(apart_m(other, anchor) > 1.0 for other in peers(house, one) if other.id != anchor.id)
 
 
-def check_lead(sign: int) -> Callable[[House, AskedQuestion], None]:
-    def check(house: House, one: AskedQuestion) -> None:
+def check_lead(sign: int) -> Callable[[House, HouseQuestion], None]:
+    def check(house: House, one: HouseQuestion) -> None:
         anchor = house.items[one.anchors[0]]
         own = apart_m(house.items[one.target], anchor)
         assert all(sign * (apart_m(p, anchor) - own) > 0.29 for p in peers(house, one) if p.id != anchor.id)
@@ -191,8 +211,8 @@ def check_lead(sign: int) -> Callable[[House, AskedQuestion], None]:
     return check
 
 
-def check_side(sign: Callable[[complex], float]) -> Callable[[House, AskedQuestion], None]:
-    def check(house: House, one: AskedQuestion) -> None:
+def check_side(sign: Callable[[complex], float]) -> Callable[[House, HouseQuestion], None]:
+    def check(house: House, one: HouseQuestion) -> None:
         anchor = house.items[one.anchors[0]]
         assert sign(side_of(one, anchor, house.items[one.target])) >= 0.34
         assert all(sign(side_of(one, anchor, p)) < -0.1 for p in peers(house, one) if p.id != anchor.id)
@@ -200,13 +220,13 @@ def check_side(sign: Callable[[complex], float]) -> Callable[[House, AskedQuesti
     return check
 
 
-def check_color(house: House, one: AskedQuestion) -> None:
+def check_color(house: House, one: HouseQuestion) -> None:
     color = house.items[one.target].item.color_name
     assert color.replace("gray", "gr") in one.text.replace("grey", "gr").replace("gray", "gr").lower()
     assert all(other.item.color_name not in ("", color) for other in peers(house, one))
 
 
-def check_between(house: House, one: AskedQuestion) -> None:
+def check_between(house: House, one: HouseQuestion) -> None:
     a, b = (house.items[k].box.mean(axis=0)[:2] for k in one.anchors[:2])
     t = house.items[one.target].box.mean(axis=0)[:2]
     detour = np.linalg.norm(t - a) + np.linalg.norm(t - b) - np.linalg.norm(a - b)
@@ -214,7 +234,7 @@ def check_between(house: House, one: AskedQuestion) -> None:
     assert min(np.linalg.norm(t - a), np.linalg.norm(t - b)) > 0.2 * np.linalg.norm(a - b)
 
 
-CHECKS: dict[str, Callable[[House, AskedQuestion], None]] = {
+CHECKS: dict[str, Callable[[House, HouseQuestion], None]] = {
     "unique": check_alone(lambda house, p: 0), "room": check_alone(lambda house, p: p.room),
     "floor": check_alone(lambda house, p: house.rooms[p.room].floor), "on": check_on, "next to": check_next_to,
     "closest": check_lead(1), "farthest": check_lead(-1), "color": check_color,
@@ -242,7 +262,7 @@ def test_questions_are_many_and_spread(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_questions_name_what_they_say(seed: int) -> None:
     house = built(seed)
-    words = {one.name: (*one.said, *one.unsaid) for one in CLASSES}
+    words = {one.name: (*one.training_words, *one.held_out_words) for one in CLASSES}
     for one, placed in ((one, house.items[one.target]) for one in asked_of(seed)):
         assert (one.room, one.floor) == (placed.room, house.rooms[placed.room].floor)
         assert np.array_equal(one.box, placed.box) and one.box.shape == (2, 3)
@@ -268,8 +288,8 @@ def test_rows_are_counted_as_seen(seed: int) -> None:
 
 
 def test_same_seed_same_questions() -> None:
-    assert json.dumps(to_json(asked_of(0))) == json.dumps(to_json(questions(built(0), 0)))
-    assert [one.text for one in questions(built(0), 1)] != [one.text for one in asked_of(0)]
+    assert json.dumps(to_json(asked_of(0))) == json.dumps(to_json(generate_questions(built(0), 0)))
+    assert [one.text for one in generate_questions(built(0), 1)] != [one.text for one in asked_of(0)]
 
 
 def test_questions_survive_json_to_a_millimetre() -> None:
@@ -300,7 +320,7 @@ def test_files_from_before_there_were_programs_are_read() -> None:
 
 def test_edges_of_count() -> None:
     house = one_room(thing("piano", 2, 2))
-    assert [one.form for one in questions(house, 0)] == ["unique"]
-    assert questions(house, 0, 0) == [] and questions(one_room(), 0) == []
+    assert [one.form for one in generate_questions(house, 0)] == ["unique"]
+    assert generate_questions(house, 0, 0) == [] and generate_questions(one_room(), 0) == []
     with pytest.raises(ConfigError, match="count"):
-        questions(house, 0, -1)
+        generate_questions(house, 0, -1)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.simulator.mesh import box_mapped
-from placegraph.tools.simulator.model import TEXTURES, Floor, House, Item, Material, Part, PlacedItem
+from placegraph.tools.simulator.house_mesh import box_uv_mapping
+from placegraph.tools.simulator.house_model import TEXTURES, Floor, House, Item, Material, Part, PlacedItem
+from placegraph.tools.simulator.mesh_primitives import block, box
 from placegraph.tools.simulator.render import Renderer
-from placegraph.tools.simulator.shapes import block, box
-from placegraph.tools.simulator.textures import atlas, tile
+from placegraph.tools.simulator.texture_atlas import atlas, tile
 
 WHITE = Material((230, 230, 230))
 AHEAD = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 1], [0, 0, 0, 1]])  # at (0, 0, 1), looking along +y
@@ -151,7 +151,7 @@ def test_a_picture_hangs_upright_and_unmirrored():
 @pytest.mark.parametrize(("low", "high"), [((0, 0, 0), (2, 0.5, 0.02)), ((0, 0, 0), (0.02, 0.5, 2))])
 def test_the_grain_of_wood_runs_along_a_board(low, high):
     board = box(low, high, Material((150, 100, 60), "wood", scale_m=0.5))
-    uv, texels_per_m = box_mapped(board.vertices[board.faces], board.material)
+    uv, texels_per_m = box_uv_mapping(board.vertices[board.faces], board.material)
     widest = np.ptp(uv, axis=1).max(axis=0)
     assert widest[0] == pytest.approx(4) and widest[1] <= 1.01
     assert set(texels_per_m.tolist()) == {256.0}

@@ -9,11 +9,11 @@ torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 from placegraph.tools.training.networks import (  # noqa: E402
     STRIDES,
     Backbone,
-    Detector,
+    DetectorExport,
     MaskDecoder,
     MaskEncoder,
     ObjectNetwork,
-    Tagger,
+    TaggerNetwork,
     anchors,
 )
 
@@ -103,7 +103,7 @@ def test_detector_boxes_decode_as_documented():
     for anchor in (9, 64 + 5, 83):
         distances[0, :, anchor] = half
     logits[0, 1, 69] = 2.0
-    found = Detector(Fixed(distances, logits), 64, 64)(torch.rand(1, 3, 64, 64), torch.rand(1, 2, 256))
+    found = DetectorExport(Fixed(distances, logits), 64, 64)(torch.rand(1, 3, 64, 64), torch.rand(1, 2, 256))
     assert found.shape == (1, 6, 84)
     # anchor 9: stride 8 at (12, 12): x 8..24, y 4..28
     torch.testing.assert_close(found[0, :4, 9], torch.tensor([16.0, 16, 16, 24]))
@@ -116,7 +116,7 @@ def test_detector_boxes_decode_as_documented():
 
 
 def test_detector_takes_any_number_of_words(network):
-    detector = Detector(network, 64, 96)
+    detector = DetectorExport(network, 64, 96)
     with torch.no_grad():
         for count in (1, 5):
             found = detector(torch.rand(1, 3, 64, 96), torch.randn(1, count, 256))
@@ -126,7 +126,7 @@ def test_detector_takes_any_number_of_words(network):
 
 def test_tagger_undoes_the_normalisation_and_pools_cells_and_anchors(network):
     text = torch.randn(5, 256)
-    tagger = Tagger(network, text).eval()
+    tagger = TaggerNetwork(network, text).eval()
     image = torch.rand(2, 3, 64, 64)
     mean, std = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])
     normal = (image - mean.view(3, 1, 1)) / std.view(3, 1, 1)
@@ -186,13 +186,13 @@ def test_the_line_reaches_the_margin_on_both_sides():
 def test_depth_is_relative_to_the_middle_and_the_box_is_drawn():
     box = torch.tensor([[0.2, 0.3, 0.6, 0.9]])
     cell = MaskDecoder().sample(ramps(64, 64), box)[0]
-    relative, drawn, size = cell[-5], cell[-3], cell[-2:]
+    relative, coarse_mask, size = cell[-5], cell[-3], cell[-2:]
     wanted = 2 * (cell[0] - 0.4)  # depth is 1 + 2 x and the box's middle at x = .4
     torch.testing.assert_close(relative, wanted, atol=5e-3, rtol=0)
     torch.testing.assert_close(cell[-4], relative * 4)
     line = MaskDecoder().line
     inside = (line > 0) & (line < 1)
-    torch.testing.assert_close(drawn, (inside[:, None] & inside[None]).float())
+    torch.testing.assert_close(coarse_mask, (inside[:, None] & inside[None]).float())
     torch.testing.assert_close(size[:, 3, 5], torch.tensor([0.4, 0.6]))
 
 

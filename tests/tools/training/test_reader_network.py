@@ -11,7 +11,7 @@ pytest.importorskip("gguf", reason="training needs the extra `train`")
 from placegraph.nodes.grounding.llm_parser import OPENING, asked  # noqa: E402
 from placegraph.runtime.errors import ModelError  # noqa: E402
 from placegraph.runtime.language.language_model import LanguageModel, default_model_path  # noqa: E402
-from placegraph.tools.training.adapter import write_adapter  # noqa: E402
+from placegraph.tools.training.lora_export import write_adapter  # noqa: E402
 from placegraph.tools.training.reader_network import RANK, AdaptedLinear, ReaderNetwork  # noqa: E402
 
 torch.set_num_threads(1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.node import available, plugin
-from placegraph.tools.simulator.model import Item
+from placegraph.tools.simulator.house_model import Item
 
 
 class Design(Protocol):
@@ -30,10 +30,10 @@ class Design(Protocol):
 @cache
 def designs() -> dict[str, Design]:
     """Every design by class name, from the modules of this folder (each exports DESIGNS)."""
-    found: dict[str, Design] = {}
+    designs_by_name: dict[str, Design] = {}
     for module in available(__name__):
-        found |= plugin(__name__, module, "DESIGNS", "catalogue module")
-    return found
+        designs_by_name |= plugin(__name__, module, "DESIGNS", "catalogue module")
+    return designs_by_name
 
 
 def design(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.model import Material
+from placegraph.tools.simulator.house_model import Material
 
 Size = tuple[float, float, float]
 Length = float | None

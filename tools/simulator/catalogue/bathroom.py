@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._assembly import fitted
+from placegraph.tools.simulator.catalogue._appliance_parts import fronts, knob, molded, tap
+from placegraph.tools.simulator.catalogue._item_assembly import fitted, plate_xz, sizes
 from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL, Length, Random
-from placegraph.tools.simulator.catalogue.lights import fronts, knob, molded, sizes, tap
-from placegraph.tools.simulator.model import Item, Material, Part, Surface
-from placegraph.tools.simulator.palette import COLORS, METALS, VIVID, WOODS, darker, jitter, pick
-from placegraph.tools.simulator.shapes import (
+from placegraph.tools.simulator.color_palette import COLORS, METALS, VIVID, WOODS, darker, jitter, pick
+from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
+from placegraph.tools.simulator.mesh_primitives import (
     Point,
     block,
     box,
@@ -136,11 +136,6 @@ def shower(random: Random, *, width_m: Length = None, depth_m: Length = None, he
     return fitted("shower", parts, (w, d, h), "")
 
 
-def _upright(outline: list[tuple[float, float]], y0: float, y1: float, material: Material) -> Part:
-    """A plate over a convex outline of (x, z), from y0 at the front to y1."""
-    return turned(extrude(outline, -y1, -y0, material), np.pi / 2, "x")
-
-
 def mirror(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
     """A framed looking glass for a wall, square, arched or oval, its glass in bands from pale sky to darker gray."""
     w, d, h = sizes(random, (width_m, depth_m, height_m), (0.4, 0.8), (0.025, 0.035), (0.55, 1.1))
@@ -153,14 +148,14 @@ def mirror(random: Random, *, width_m: Length = None, depth_m: Length = None, he
     angles = np.linspace(0, 2 * np.pi, 20, endpoint=False) + np.pi / 20
     ring = np.stack((np.cos(angles), np.sin(angles)), axis=1)
     ring /= (np.abs(ring) ** corner).sum(axis=1, keepdims=True) ** (1 / corner)
-    parts = [_upright([(x * w / 2, z * h / 2) for x, z in ring.tolist()], -d / 2, d / 2, frame)]
+    parts = [plate_xz([(x * w / 2, z * h / 2) for x, z in ring.tolist()], -d / 2, d / 2, frame)]
     tint, lean = np.array(jitter((186, 204, 216), random, 6)), float(random.uniform(0.1, 0.4))
     for k, share in enumerate((1.0, 0.55, 0.15, -0.3)):  # each band covers the lower part of the one before
         r, g, b = (tint * (1.0 - 0.1 * k)).astype(int).tolist()
         glass = Material((r, g, b), "noise", (r - 12, g - 8, b - 4), 0.6, gloss=0.9)
         inner = [(x * (w / 2 - edge), z * (h / 2 - edge)) for x, z in ring.tolist()]
         line = [(x, min(z, h / 2 * share + lean * x)) for x, z in inner]
-        parts.append(_upright(line if k else inner, -d / 2 - 0.001 * (k + 1), 0, glass))
+        parts.append(plate_xz(line if k else inner, -d / 2 - 0.001 * (k + 1), 0, glass))
     return fitted("mirror", parts, (w, d, h), word)
 
 
@@ -225,7 +220,7 @@ def washing_machine(random: Random, *, width_m: Length = None, depth_m: Length =
     shining = Material((120, 210, 220), glow=0.7)
     parts.append(block((shown * w, y - 0.008, h * 0.88), (w * 0.18, 0.01, h * 0.045), shining))
     parts.append(box((w * 0.22, y - 0.006, 0.05), (w * 0.44, y, 0.14), Material(darker(color, 0.85))))
-    top = Surface(-w / 2 + 0.02, -d / 2 + 0.08, w / 2 - 0.02, d / 2 - 0.02, h, 0.6)
+    top = SupportSurface(-w / 2 + 0.02, -d / 2 + 0.08, w / 2 - 0.02, d / 2 - 0.02, h, 0.6)
     return fitted("washing machine", parts, (w, d, h), word, (top,))
 
 
@@ -281,7 +276,9 @@ def ironing_board(random: Random, *, width_m: Length = None, depth_m: Length = N
     parts.append(block((w * 0.5, 0, z - 0.035), (0.014, d * 0.68, 0.014), metal))
     if iron:
         parts += [moved(part, (w * 0.38, 0, z - 0.02)) for part in _iron(random)]
-    return fitted("ironing board", parts, (w, d, h), word, (Surface(-w * 0.3, -d * 0.35, w * 0.2, d * 0.35, z, 0.8),))
+    return fitted(
+        "ironing board", parts, (w, d, h), word, (SupportSurface(-w * 0.3, -d * 0.35, w * 0.2, d * 0.35, z, 0.8),)
+    )
 
 
 def _iron(random: Random) -> list[Part]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._assembly import chance, circle, drawn, fitted, hoop, merged, plate_xz
-from placegraph.tools.simulator.model import Item, Material, Part
-from placegraph.tools.simulator.palette import METALS, VIVID, jitter, pick
-from placegraph.tools.simulator.shapes import Point, block, ellipsoid, moved, tube
+from placegraph.tools.simulator.catalogue._item_assembly import chance, circle, drawn, fitted, hoop, merged, plate_xz
+from placegraph.tools.simulator.color_palette import METALS, VIVID, jitter, pick
+from placegraph.tools.simulator.house_model import Item, Material, Part
+from placegraph.tools.simulator.mesh_primitives import Point, block, ellipsoid, moved, tube
 
 _BLACK = Material((30, 30, 32), gloss=0.2)
 _STEEL = Material(METALS["gray"], gloss=0.7)

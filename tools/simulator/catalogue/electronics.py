@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from placegraph.tools.simulator.catalogue._assembly import drawn
-from placegraph.tools.simulator.catalogue.tables import Size, assembled, finish, metal
-from placegraph.tools.simulator.model import Color, Item, Material, Part
-from placegraph.tools.simulator.palette import COLORS, darker, jitter, pick
-from placegraph.tools.simulator.shapes import Point, block, box, cylinder, extrude, lathe, moved, turned
+from placegraph.tools.simulator.catalogue._cabinet_parts import finish, metal
+from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
+from placegraph.tools.simulator.catalogue.tables import Size
+from placegraph.tools.simulator.color_palette import COLORS, darker, jitter, pick
+from placegraph.tools.simulator.house_model import Color, Item, Material, Part
+from placegraph.tools.simulator.mesh_primitives import Point, block, box, cylinder, extrude, lathe, moved, turned
 
 _BLACK = Material((24, 24, 27), gloss=0.4)
 _PAPER = Material((244, 243, 238))

@@ -6,10 +6,19 @@ import numpy as np
 
 from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._assembly import arc, chance, drawn, fitted, loft, merged, plate_xz, rounded
-from placegraph.tools.simulator.model import Item, Material, Part
-from placegraph.tools.simulator.palette import METALS, VIVID, darker, pick
-from placegraph.tools.simulator.shapes import block, box, ellipsoid, moved, tube
+from placegraph.tools.simulator.catalogue._item_assembly import (
+    arc,
+    chance,
+    drawn,
+    fitted,
+    loft,
+    merged,
+    plate_xz,
+    rounded,
+)
+from placegraph.tools.simulator.color_palette import METALS, VIVID, darker, pick
+from placegraph.tools.simulator.house_model import Item, Material, Part
+from placegraph.tools.simulator.mesh_primitives import block, box, ellipsoid, moved, tube
 
 _Level = tuple[float, float, float, float]  # z, half width, front y, back y
 _BODY: tuple[_Level, ...] = (

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._assembly import chance, drawn, fitted, loft, merged
-from placegraph.tools.simulator.model import Color, Item, Material, Part
-from placegraph.tools.simulator.palette import COLORS, VIVID, darker, jitter, pick
-from placegraph.tools.simulator.shapes import Point, block, cylinder, ellipsoid, lathe, moved, tube
+from placegraph.tools.simulator.catalogue._item_assembly import chance, drawn, fitted, loft, merged
+from placegraph.tools.simulator.color_palette import COLORS, VIVID, darker, jitter, pick
+from placegraph.tools.simulator.house_model import Color, Item, Material, Part
+from placegraph.tools.simulator.mesh_primitives import Point, block, cylinder, ellipsoid, lathe, moved, tube
 
 _GREENS: tuple[Color, ...] = ((52, 112, 48), (84, 140, 58), (38, 88, 52), (112, 150, 70))
 _TERRACOTTA: Color = (176, 96, 62)
@@ -139,8 +139,8 @@ def potted_plant(
     slim = np.array([*[min(1.0, 0.45 * height / reach)] * 2, 1.0])  # no wider than a room has space for
     parts = [Part(part.vertices * slim, part.faces, part.material) for part in parts]
     foliage = [merged(group) for material in greens if (group := [p for p in parts if p.material is material])]
-    others = [part for part in parts if part.material not in greens]
-    potted = [*_pot(random, pot * float(random.uniform(0.5, 0.65)), pot), *others, *foliage]
+    stems = [part for part in parts if part.material not in greens]
+    potted = [*_pot(random, pot * float(random.uniform(0.5, 0.65)), pot), *stems, *foliage]
     return fitted("potted plant", potted, (width_m, depth_m, height), "green")
 
 

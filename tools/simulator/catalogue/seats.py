@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from placegraph.tools.simulator.catalogue._assembly import drawn
-from placegraph.tools.simulator.catalogue.beds import cloth, cushion, leaned, legs, upholstered
-from placegraph.tools.simulator.catalogue.tables import Size, assembled, finish, metal, wood
-from placegraph.tools.simulator.model import Item, Material, Part, Surface
-from placegraph.tools.simulator.palette import darker
-from placegraph.tools.simulator.shapes import box, cylinder, lathe, moved, tube, turned
+from placegraph.tools.simulator.catalogue._cabinet_parts import finish, metal, wood
+from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
+from placegraph.tools.simulator.catalogue._upholstery import cloth, cushion, leaned, legs, upholstered
+from placegraph.tools.simulator.catalogue.tables import Size
+from placegraph.tools.simulator.color_palette import darker
+from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
+from placegraph.tools.simulator.mesh_primitives import box, cylinder, lathe, moved, tube, turned
 
 
 def _chair_back(style: str, w: float, y: float, z0: float, z1: float, frame: Material, pad: Material) -> list[Part]:
@@ -228,7 +229,7 @@ def bench(random: Generator, *, width_m: Size = None, depth_m: Size = None, heig
         parts = [box((x, -d / 2, 0), (x + 0.03, d / 2, h - 0.07), frame) for x in (-w / 2, w / 2 - 0.03)]
         parts += [box((-w / 2, -d / 2, z), (w / 2, d / 2, z + 0.025), frame) for z in (0.12, h - 0.09)]
         parts.append(cushion((-w / 2, -d / 2, h - 0.065), (w / 2, d / 2, h), cloth(random)[1], 0.025))
-        shelf = Surface(0.05 - w / 2, 0.02 - d / 2, w / 2 - 0.05, d / 2 - 0.02, 0.145, h - 0.26)
+        shelf = SupportSurface(0.05 - w / 2, 0.02 - d / 2, w / 2 - 0.05, d / 2 - 0.02, 0.145, h - 0.26)
         return assembled("bench", parts, (w, d, h), name, [shelf])
     parts = legs(w - 0.1, d - 0.02, seat - 0.02, 0.06, frame)
     wide = d / 3 - 0.012
@@ -239,7 +240,7 @@ def bench(random: Generator, *, width_m: Size = None, depth_m: Size = None, heig
     if style == "back":
         parts += _bench_back(w, d, seat, h, frame)
         x, y = w / 2 - 0.12, d / 2 - 0.07
-    return assembled("bench", parts, (w, d, h), name, [Surface(-x, 0.02 - d / 2, x, y, seat, 1.0)])
+    return assembled("bench", parts, (w, d, h), name, [SupportSurface(-x, 0.02 - d / 2, x, y, seat, 1.0)])
 
 
 def _bench_back(w: float, d: float, seat: float, h: float, frame: Material) -> list[Part]:

@@ -7,11 +7,8 @@ import itertools
 import numpy as np
 from numpy.random import Generator
 
-from placegraph.tools.simulator.catalogue._assembly import drawn
-from placegraph.tools.simulator.catalogue.tables import (
+from placegraph.tools.simulator.catalogue._cabinet_parts import (
     Fronts,
-    Size,
-    assembled,
     case,
     dark_of,
     finish,
@@ -19,10 +16,12 @@ from placegraph.tools.simulator.catalogue.tables import (
     metal,
     standing,
     wood,
-)  # fmt: skip
-from placegraph.tools.simulator.model import Item, Material, Part, Surface
-from placegraph.tools.simulator.palette import MUTED, VIVID, darker, pick
-from placegraph.tools.simulator.shapes import box, cylinder, ellipsoid, moved, tube
+)
+from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
+from placegraph.tools.simulator.catalogue.tables import Size
+from placegraph.tools.simulator.color_palette import MUTED, VIVID, darker, pick
+from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
+from placegraph.tools.simulator.mesh_primitives import box, cylinder, ellipsoid, moved, tube
 
 
 def wardrobe(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
@@ -97,7 +96,7 @@ def bookshelf(random: Generator, *, width_m: Size = None, depth_m: Size = None, 
     columns = max(2, round(w / 0.4)) if style == "cubes" else 1
     edges = np.linspace(-w / 2 + side, w / 2 - side, columns + 1).tolist()
     parts += [box((x - t / 2, -d / 2 + 0.002, 0.05), (x + t / 2, d / 2 - 0.01, h - t / 2), board) for x in edges[1:-1]]
-    surfaces = [Surface(-w / 2 + 0.02, -d / 2 + 0.02, w / 2 - 0.02, d / 2 - 0.02, h, 0.5)] if h < 1.7 else []
+    surfaces = [SupportSurface(-w / 2 + 0.02, -d / 2 + 0.02, w / 2 - 0.02, d / 2 - 0.02, h, 0.5)] if h < 1.7 else []
     cells = [(k, c) for k in range(len(floors) - 1) for c in range(columns)]
     free = int(random.integers(len(cells)))  # one is always free and its neighbour always full
     for i, (k, c) in enumerate(cells):
@@ -107,7 +106,7 @@ def bookshelf(random: Generator, *, width_m: Size = None, depth_m: Size = None, 
             rows, x0 = _books(random, x0, x1, d / 2 - 0.02, d, z, gap)
             parts += rows
         if x1 - x0 > 0.15:
-            surfaces.append(Surface(x0 + 0.02, -d / 2 + 0.02, x1 - 0.02, d / 2 - 0.03, z, gap))
+            surfaces.append(SupportSurface(x0 + 0.02, -d / 2 + 0.02, x1 - 0.02, d / 2 - 0.03, z, gap))
     return assembled("bookshelf", parts, (w, d, h), name, surfaces)
 
 
@@ -131,7 +130,7 @@ def dresser(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
         for x0, x1 in itertools.pairwise(edges):
             parts += fronts.drawer(x0, x1, levels[k], levels[k + 1], y)
     return assembled(
-        "dresser", parts, (w, d, h), name, (Surface(-w / 2 + 0.02, y + 0.02, w / 2 - 0.02, d / 2 - 0.02, h),)
+        "dresser", parts, (w, d, h), name, (SupportSurface(-w / 2 + 0.02, y + 0.02, w / 2 - 0.02, d / 2 - 0.02, h),)
     )
 
 
@@ -144,7 +143,7 @@ def cabinet(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
     fronts = fronts_of(random, body)
     base, z0 = standing(random, w, d, h, body)
     y, low, high = -d / 2 + fronts.reach_m, z0 + 0.012, h - 0.03
-    parts, surfaces = list(base), [Surface(-w / 2 + 0.02, y + 0.02, w / 2 - 0.02, d / 2 - 0.02, h)]
+    parts, surfaces = list(base), [SupportSurface(-w / 2 + 0.02, y + 0.02, w / 2 - 0.02, d / 2 - 0.02, h)]
     count = max(2, round(w / 0.45))
     if style == "open middle":
         inner, middle, wide = w / 6, (low + high) / 2, w / 3
@@ -154,7 +153,7 @@ def cabinet(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
         parts.append(box((-inner, d / 2 - 0.01, z0), (inner, d / 2 - 0.001, h - 0.01), dark_of(body)))
         parts += fronts.door(-w / 2 + 0.012, -inner, low, high, y, handle_left=False)
         parts += fronts.door(inner, w / 2 - 0.012, low, high, y, handle_left=True)
-        surfaces += [Surface(0.02 - inner, y + 0.02, inner - 0.02, d / 2 - 0.03, z, middle - z0 - 0.03)
+        surfaces += [SupportSurface(0.02 - inner, y + 0.02, inner - 0.02, d / 2 - 0.03, z, middle - z0 - 0.03)
                      for z in (z0 + 0.02, middle + 0.02)]  # fmt: skip
         return assembled("cabinet", parts, (w, d, h), name, surfaces)
     parts += case(w, d, z0, h, y, body)
@@ -203,7 +202,11 @@ def shoe_rack(random: Generator, *, width_m: Size = None, depth_m: Size = None, 
                 parts += _pair_of_shoes(random, x, 0, z + 0.02, min(0.28, d))
                 shoes += 1
     return assembled(
-        "shoe rack", parts, (w, d, h), name, (Surface(-w / 2 + 0.03, -d / 2, w / 2 - 0.03, d / 2, zs[-1] + 0.02),)
+        "shoe rack",
+        parts,
+        (w, d, h),
+        name,
+        (SupportSurface(-w / 2 + 0.03, -d / 2, w / 2 - 0.03, d / 2, zs[-1] + 0.02),),
     )
 
 

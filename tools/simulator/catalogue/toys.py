@@ -6,10 +6,10 @@ import numpy as np
 
 from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._assembly import chance, drawn, fitted, hoop
-from placegraph.tools.simulator.model import Color, Item, Material, Part
-from placegraph.tools.simulator.palette import COLORS, MUTED, VIVID, darker, jitter, pick
-from placegraph.tools.simulator.shapes import block, ellipsoid, moved, turned
+from placegraph.tools.simulator.catalogue._item_assembly import chance, drawn, fitted, hoop
+from placegraph.tools.simulator.color_palette import COLORS, MUTED, VIVID, darker, jitter, pick
+from placegraph.tools.simulator.house_model import Color, Item, Material, Part
+from placegraph.tools.simulator.mesh_primitives import block, ellipsoid, moved, turned
 
 _FURS: dict[str, Color] = {"brown": (122, 80, 48), "light brown": (178, 132, 84), "beige": (212, 190, 154),
                            "gray": (140, 138, 136), "white": (228, 222, 212), "pink": (220, 156, 172)}  # fmt: skip
@@ -46,8 +46,8 @@ def pillow(
     height = drawn(random, height_m, 0.12, 0.18)
     name, color = pick(random, ("white", "white", "beige", "blue", "gray") if bed else (*VIVID, *MUTED))
     texture = str(random.choice(["plain", "fabric"] if bed else ["fabric", "stripes", "checks", "plain"]))
-    other = darker(color, 0.8) if texture == "fabric" else pick(random, MUTED)[1]
-    cloth = Material(color, texture, other, float(random.uniform(0.06, 0.3)), int(random.integers(1000)))
+    second = darker(color, 0.8) if texture == "fabric" else pick(random, MUTED)[1]
+    cloth = Material(color, texture, second, float(random.uniform(0.06, 0.3)), int(random.integers(1000)))
     if height > depth:
         cushion = turned(_puffed(width, height, depth, cloth), np.pi / 2, "x")
     else:
@@ -116,7 +116,7 @@ def _patches(rings: list[F64], radius_m: float, material: Material) -> Part:
     vertices: list[F64] = []
     faces: list[tuple[int, ...]] = []
     for ring in rings:
-        start = sum(len(one) for one in vertices)
+        start = sum(len(points_before) for points_before in vertices)
         points, fan = _fan(ring / np.linalg.norm(ring, axis=1, keepdims=True))
         vertices.append(points)
         faces += [tuple(i + start for i in face) for face in fan]
@@ -169,8 +169,8 @@ def ball(
     height_m: float | None = None,
 ) -> Item:
     """A football, a basketball or a beach ball; one size that is given holds for all three."""
-    given = next((size for size in (width_m, depth_m, height_m) if size is not None), None)
-    size = drawn(random, given, 0.19, 0.26)
+    asked = next((size for size in (width_m, depth_m, height_m) if size is not None), None)
+    size = drawn(random, asked, 0.19, 0.26)
     kinds = (_football, _football, _basketball, _beach_ball)
     name, parts = kinds[int(random.integers(len(kinds)))](random, size / 2)
     turn = float(random.uniform(0, 2 * np.pi))
