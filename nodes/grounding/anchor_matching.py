@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import Boxes, Layout, joined
+from placegraph.nodes.grounding.box_arrays import Boxes, Layout, concatenate
 from placegraph.nodes.grounding.program import Condition
-from placegraph.nodes.grounding.relations import HOLDS, Case, Fits, families
-from placegraph.nodes.grounding.relations.nearness import walled
-from placegraph.nodes.grounding.scoring import Weighing
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.relations import HOLDS, PairFits, RelationQuery, relations_by_name
+from placegraph.nodes.grounding.relations.nearness import in_different_rooms
+from placegraph.nodes.grounding.scoring import ScoredCandidates
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64, I64, Bool
 
 OTHER_ROOM = 0.5  # departs: what is said of two things is meant within one room; through a wall it counts half
@@ -33,21 +33,21 @@ class Anchors:
     weights: F64
     trust: float = 1.0
     count: int = 0
-    single: bool = False  # the map holds one thing that is called so
+    is_unique: bool = False  # the map holds one thing that is called so
 
     @classmethod
-    def of(cls, weighings: Sequence[Weighing], trust: float, count: int) -> Anchors:
+    def of(cls, weighings: Sequence[ScoredCandidates], trust: float, count: int) -> Anchors:
         """The outcome of weighings, best first; at least one."""
-        boxes = joined([one.boxes for one in weighings])
+        boxes = concatenate([one.boxes for one in weighings])
         weights = np.concatenate([one.best() for one in weighings])
         order = np.argsort(-weights, kind="stable")
-        return cls(boxes.take(order), weights[order], trust, count, len(weighings) == 1 and weighings[0].single)
+        return cls(boxes.take(order), weights[order], trust, count, len(weighings) == 1 and weighings[0].is_unique)
 
     def first(self, most: int) -> Anchors:
         """The best of them, at most so many."""
         if len(self.boxes) <= most:
             return self
-        return Anchors(self.boxes.take(np.arange(most)), self.weights[:most], self.trust, self.count, self.single)
+        return Anchors(self.boxes.take(np.arange(most)), self.weights[:most], self.trust, self.count, self.is_unique)
 
     def best(self, level: float = 0.999) -> Boxes:
         """Those that fit as well as the best."""
@@ -55,7 +55,7 @@ class Anchors:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class TargetFits:
     """What a condition gives: values (n,), fits or measures, a sentence for each, and how much it decides."""
 
     values: F64
@@ -65,56 +65,56 @@ class Outcome:
     known: bool
 
 
-def related(condition: Condition, targets: Boxes, anchors: Sequence[Anchors], layout: Layout, views: Views) -> Outcome:
+def match_anchors(condition: Condition, targets: Boxes, anchors: Sequence[Anchors], layout: Layout, viewpoints: ViewpointSelector) -> TargetFits:
     """A condition's best anchor for each of n targets; a thing is never its own anchor."""
     name = condition.name
-    judge = families()[name].judge
+    evaluate = relations_by_name()[name].evaluate
     if not anchors:
-        return related_without(Case(name, targets, None, layout, views))
+        return fits_without_anchor(RelationQuery(name, targets, None, layout, viewpoints))
     first = anchors[0]
     trust = min(one.trust for one in anchors)
     if name == "between":
-        a, b, weights = _pairs(anchors)
-        case = Case(name, targets, first.boxes.take(a), layout, views, anchors[-1].boxes.take(b))
-        assert case.seconds is not None
-        own = _identical(targets, first.boxes.take(a)) | _identical(targets, case.seconds)
+        a, b, weights = _anchor_pairs(anchors)
+        query = RelationQuery(name, targets, first.boxes.take(a), layout, viewpoints, anchors[-1].boxes.take(b))
+        assert query.second_anchors is not None
+        own = _same_node(targets, first.boxes.take(a)) | _same_node(targets, query.second_anchors)
     else:
-        case = Case(name, targets, first.boxes, layout, views)
-        weights, own = first.weights, _identical(targets, first.boxes)
-    fits = judge(case)
+        query = RelationQuery(name, targets, first.boxes, layout, viewpoints)
+        weights, own = first.weights, _same_node(targets, first.boxes)
+    fits = evaluate(query)
     trust *= fits.trust
     if name in ("closest", "farthest"):
-        return _farther(fits, weights, own, name, trust)
-    assert case.anchors is not None
+        return _rank_by_distance(fits, weights, own, name, trust)
+    assert query.anchors is not None
     values = np.where(own, 0.0, fits.values)
-    if name not in UNDAMPED and case.anchors.ids and any(case.anchors.ids):
-        values = values * np.where(walled(targets, case.anchors) > 0, OTHER_ROOM, 1.0)
+    if name not in UNDAMPED and query.anchors.ids and any(query.anchors.ids):
+        values = values * np.where(in_different_rooms(targets, query.anchors) > 0, OTHER_ROOM, 1.0)
     soft = values * weights[None]
     best = soft.argmax(axis=1) if soft.size else np.zeros(len(targets), np.int64)
     found = soft.max(axis=1, initial=0.0)
     if first.count and len(anchors) == 1:
         held = ((values >= HOLDS) & (weights[None] >= HOLDS)).sum(axis=1)
         found = found * np.power(MISCOUNT, np.abs(held - first.count))
-    return Outcome(found, _sentences(fits, best, own, targets, name), 0.0, trust, fits.known)
+    return TargetFits(found, _sentences(fits, best, own, targets, name), 0.0, trust, fits.known)
 
 
-def related_without(case: Case) -> Outcome:
+def fits_without_anchor(query: RelationQuery) -> TargetFits:
     """A condition without a thing."""
-    fits = families()[case.relation].judge(case)
-    return Outcome(fits.values[:, 0], lambda i: fits.sentence(i, 0), fits.margin, fits.trust, fits.known)
+    fits = relations_by_name()[query.relation].evaluate(query)
+    return TargetFits(fits.values[:, 0], lambda i: fits.sentence(i, 0), fits.margin, fits.trust, fits.known)
 
 
-def _farther(fits: Fits, weights: F64, own: Bool, name: str, trust: float) -> Outcome:
+def _rank_by_distance(fits: PairFits, weights: F64, own: Bool, name: str, trust: float) -> TargetFits:
     """Distances to the nearest anchor, where one that is less likely meant counts as farther away."""
     doubt = -DOUBT_M * np.log2(np.maximum(weights, 1e-3))[None]
     away = np.where(own, np.inf, np.abs(fits.values) + doubt)
     best = away.argmin(axis=1) if away.size else np.zeros(len(away), np.int64)
     nearest = away.min(axis=1, initial=np.inf)
     values = np.where(np.isfinite(nearest), -nearest if name == "closest" else nearest, np.nan)
-    return Outcome(values, lambda i: fits.sentence(i, int(best[i])), fits.margin, trust, fits.known)
+    return TargetFits(values, lambda i: fits.sentence(i, int(best[i])), fits.margin, trust, fits.known)
 
 
-def _pairs(anchors: Sequence[Anchors]) -> tuple[I64, I64, F64]:
+def _anchor_pairs(anchors: Sequence[Anchors]) -> tuple[I64, I64, F64]:
     """Rows of the first and the second anchor of each pair, and the weights of the pairs."""
     first, second = anchors[0], anchors[-1]
     n, m = min(len(first.boxes), MAX_ENDS), min(len(second.boxes), MAX_ENDS)
@@ -125,7 +125,7 @@ def _pairs(anchors: Sequence[Anchors]) -> tuple[I64, I64, F64]:
     return a, b, first.weights[a] * second.weights[b]
 
 
-def _identical(targets: Boxes, anchors: Boxes) -> Bool:
+def _same_node(targets: Boxes, anchors: Boxes) -> Bool:
     """(n, m) whether a target is the anchor."""
     rows = {name: j for j, name in enumerate(anchors.ids) if name}
     if len(rows) == sum(map(bool, anchors.ids)):
@@ -137,7 +137,7 @@ def _identical(targets: Boxes, anchors: Boxes) -> Bool:
     return np.asarray(np.array(targets.ids, object)[:, None] == np.array(anchors.ids, object)[None])
 
 
-def _sentences(fits: Fits, best: I64, own: Bool, targets: Boxes, name: str) -> Callable[[int], str]:
+def _sentences(fits: PairFits, best: I64, own: Bool, targets: Boxes, name: str) -> Callable[[int], str]:
     def sentence(i: int) -> str:
         if not own.shape[1] or own[i].all():
             return f"{targets.labels[i]} has nothing to be {name}"

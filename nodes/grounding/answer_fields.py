@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.program import Thing
-from placegraph.nodes.grounding.program_executor import Grounder
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Question
@@ -23,10 +23,10 @@ from placegraph.runtime.scene_graph.route import find_route
 NO_WAY: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
 
 
-def found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure: bool) -> dict[str, Any]:
+def found(graph: SceneGraph, ranking: Ranking, executor: ProgramExecutor, k: int, sure: bool) -> dict[str, Any]:
     """The fields that say what the best candidate is; the ranking holds at least one."""
     best = ranking.candidates[0]
-    view = grounder.viewpoint(best.node)
+    view = executor.viewpoint(best.node)
     return {
         "status": "found",
         "object_id": best.node.id,
@@ -37,26 +37,26 @@ def found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure:
         "evidence": [*ranking.notes, *best.evidence],
         "candidates": [_candidate(candidate) for candidate in ranking.candidates[:k]],
         "sure": sure,
-        **_way_to(graph, best.node, grounder.asker_world),
+        **_way_to(graph, best.node, executor.asker_world),
         "viewpoint": {"source": view.source, "xyz": numbers(view.xyz_world)},
     }
 
 
-def not_in_map(graph: SceneGraph, target: Thing, ranking: Ranking, grounder: Grounder, names: Names) -> dict[str, Any]:
+def not_in_map(graph: SceneGraph, target: Thing, ranking: Ranking, executor: ProgramExecutor, names: NameMatcher) -> dict[str, Any]:
     """The fields that say that nothing fits, and what is there instead."""
     noun = "" if target.noun == "thing" else target.noun
     objects = graph.layer("object")
     where = " there" if any(one.kind == "place" for one in target.conditions) else " in the map"
     missing = f"is called {noun}" if noun else "fits the question"
     evidence = [*ranking.notes, f"nothing{where} {missing}"]
-    elsewhere = names.named(noun, objects) if noun else []
+    elsewhere = names.best_matches(noun, objects) if noun else []
     if elsewhere:
         listed = [f"{fit.node.name} {fit.node.id} in {_place(graph, fit.node)}" for fit in elsewhere[:5]]
         evidence.append(f"elsewhere: {'; '.join(listed)}")
     else:
-        nearest = names.nearest(noun, objects)
+        nearest = names.nearest_names(noun, objects)
         evidence.append(f"the nearest names in the map: {', '.join(nearest) or 'none'}")
-    view = grounder.viewpoint(graph.building)
+    view = executor.viewpoint(graph.building)
     return {
         "status": "not_in_map",
         "object_id": None,

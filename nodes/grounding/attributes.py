@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
-from placegraph.nodes.grounding.relations.extent import bulk, length_m
+from placegraph.nodes.grounding.relations.extent import length_m, log_size
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.scene_graph import Node
@@ -38,7 +38,7 @@ SIZES = {
     "low": "short", "long": "long", "wide": "long", "narrow": "narrow", "slim": "narrow", "thin": "narrow",
 }  # fmt: skip
 SHADES = {"dark": -1.0, "darker": -1.0, "deep": -1.0, "light": 1.0, "lighter": 1.0, "pale": 1.0, "bright": 0.0}
-SAID_BESIDE = frozenset(("color", "colour", "colored", "coloured", "in", "with", "a", "very", "mostly", "kind", "of"))
+FILLER_WORDS = frozenset(("color", "colour", "colored", "coloured", "in", "with", "a", "very", "mostly", "kind", "of"))
 COLOR_FALLOFF = 30.0  # departs: CIELAB distance at which a colour's fit falls to 1/e; a median under room light is dull
 SHADE_L = 20.0  # departs: CIELAB lightness between brown and dark brown
 UNKNOWN_FIT = 0.5  # an object whose colour was not seen neither fits nor fails
@@ -47,7 +47,7 @@ SIZE_LEAST = 0.4  # departs: the smallest of several is still called large by so
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class AppearanceFits:
     """How well n things fit the words: values (n,), whether the map knows, and a sentence for each."""
 
     values: F64
@@ -55,12 +55,12 @@ class Look:
     sentences: tuple[str, ...]
 
 
-def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> Look:
+def appearance_fits(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> AppearanceFits:
     """How well each of n nodes fits the words of an `is`; among (n,): those with whom sizes are compared."""
-    said = [word for word in tokens(words.replace("-", " ")) if word not in SAID_BESIDE]
+    said = [word for word in tokens(words.replace("-", " ")) if word not in FILLER_WORDS]
     values, known = np.ones(len(nodes)), []
     notes: list[list[str]] = [[] for _ in nodes]
-    color = next((COLORS[stem] for word in said if (stem := _stem(word)) in COLORS), "")
+    color = next((COLORS[stem] for word in said if (stem := _color_stem(word)) in COLORS), "")
     shade = next((SHADES[word] for word in said if word in SHADES), 0.0)
     if color or (shade and len(said) == 1):
         fits, told = _colors(nodes, color, shade, said)
@@ -70,7 +70,7 @@ def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> Look:
             seen = f"sRGB {node.color}" if node.color else "a colour that was not seen"
             notes[i].append(f"{boxes.labels[i]} has {seen}: {words} fits {fits[i]:.2f}")
     for word in said:
-        if _stem(word) in COLORS or word in SHADES:
+        if _color_stem(word) in COLORS or word in SHADES:
             continue
         tagged = np.array([_is_tagged(node, word) for node in nodes], bool)
         if tagged.any():
@@ -86,10 +86,10 @@ def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> Look:
                 notes[i].append(f"{boxes.labels[i]} among {int(among.sum())}: {word} fits {fits[i]:.2f}")
         else:
             known.append(False)
-    return Look(values, bool(known) and all(known), tuple("; ".join(note) for note in notes))
+    return AppearanceFits(values, bool(known) and all(known), tuple("; ".join(note) for note in notes))
 
 
-def _stem(word: str) -> str:
+def _color_stem(word: str) -> str:
     """The colour in greenish, reddish, whitish."""
     if not word.endswith("ish"):
         return word
@@ -102,7 +102,7 @@ def _is_tagged(node: Node, word: str) -> bool:
 
 
 def _colors(nodes: Sequence[Node], color: str, shade: float, said: Sequence[str]) -> tuple[F64, bool]:
-    tagged = np.array([any(_is_tagged(node, word) for word in said if _stem(word) in COLORS) for node in nodes], bool)
+    tagged = np.array([any(_is_tagged(node, word) for word in said if _color_stem(word) in COLORS) for node in nodes], bool)
     seen = np.array([len(node.color) == 3 for node in nodes], bool)
     fits = np.full(len(nodes), UNKNOWN_FIT)
     if seen.any():
@@ -134,7 +134,7 @@ def color_fit(node: Node, color: str) -> float:
 def size_fit(boxes: Boxes, size: str, among: Bool) -> F64:
     """(n,) how well each is called large, small, tall, short, long or narrow among the others: by its rank."""
     if size in ("large", "small"):
-        values = bulk(boxes)
+        values = log_size(boxes)
     elif size in ("tall", "short"):
         values = boxes.size[:, 2]
     else:

@@ -60,7 +60,7 @@ class Boxes:
         )  # fmt: skip
 
 
-def joined(parts: Sequence[Boxes]) -> Boxes:
+def concatenate(parts: Sequence[Boxes]) -> Boxes:
     """All of several; at least one part."""
     return Boxes(
         sum((part.labels for part in parts), ()), sum((part.ids for part in parts), ()),
@@ -97,14 +97,14 @@ class Layout:
         """(N, 2) middles of rooms by their rows."""
         return np.asarray((self.room_low[room, :2] + self.room_high[room, :2]) / 2)
 
-    def shell(self, kind: str) -> Boxes:
+    def room_parts(self, kind: str) -> Boxes:
         """What rooms, else the building, consist of: kind floor, ceiling, wall, corner, center or room."""
         low, high = (self.room_low[:-1], self.room_high[:-1]) if self.rooms else (self.room_low, self.room_high)
         rows = np.arange(len(low)) if self.rooms else np.array([-1])
         names = [room.id for room in self.rooms] or ["B0"]
         parts: list[tuple[int, F64, F64, str]] = []
         for k, name in enumerate(names):
-            parts += [(int(rows[k]), *box) for box in _shell_of(kind, low[k], high[k], name)]
+            parts += [(int(rows[k]), *box) for box in _room_part_boxes(kind, low[k], high[k], name)]
         count = len(parts)
         return Boxes(
             tuple(part[3] for part in parts), ("",) * count, np.array([part[1] for part in parts]).reshape(-1, 3),
@@ -113,7 +113,7 @@ class Layout:
         )  # fmt: skip
 
 
-def _shell_of(kind: str, low: F64, high: F64, room: str) -> list[tuple[F64, F64, str]]:
+def _room_part_boxes(kind: str, low: F64, high: F64, room: str) -> list[tuple[F64, F64, str]]:
     if kind == "room":
         return [(low, high, f"room {room}")]
     if kind == "center":

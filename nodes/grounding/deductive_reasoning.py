@@ -19,7 +19,7 @@ import numpy as np
 from placegraph.nodes.grounding.attributes import BASIC_COLORS, color_fit
 from placegraph.nodes.grounding.edge_descriptions import edges
 from placegraph.nodes.grounding.llm_selection import NONE, Dialogue, Entry, Selection
-from placegraph.nodes.grounding.program_executor import Grounder
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.nodes.grounding.rule_parser import check_text
 from placegraph.runtime.language.language_model import LanguageModel
@@ -36,7 +36,7 @@ OTHERS = 0.5  # score of a target that was not chosen; the model gives no number
 
 
 @dataclass(frozen=True)
-class Kept:
+class LevelSelection:
     """What was kept of each level, as ids; the reply's `parse`."""
 
     floors: tuple[str, ...] = ()
@@ -47,7 +47,7 @@ class Kept:
 
 
 @dataclass(frozen=True)
-class _Level:
+class _LevelNodes:
     """Nodes of one level: those where the target can be, or that can be it, and the same for the anchors."""
 
     targets: Sequence[Node]
@@ -62,36 +62,36 @@ class _Level:
         return tuple(node.id for node in self.both)
 
 
-def deduce(model: LanguageModel, grounder: Grounder, question: str) -> tuple[Kept, Ranking]:
+def deduce(model: LanguageModel, executor: ProgramExecutor, question: str) -> tuple[LevelSelection, Ranking]:
     """What was kept on the way down, and the ranking: the chosen object first; none when the model says so.
 
     grounder: of the graph that is asked, with the asker's place.
     Raises QueryError when the text is no question, or one entry does not fit the context.
     """
     check_text(question)
-    return _Flow(model, grounder, question).run()
+    return _DeductiveSearch(model, executor, question).run()
 
 
-class _Flow:
+class _DeductiveSearch:
     """The steps of one question."""
 
-    def __init__(self, model: LanguageModel, grounder: Grounder, question: str) -> None:
-        self._grounder, self._graph, self._names = grounder, grounder.graph, grounder.names
+    def __init__(self, model: LanguageModel, executor: ProgramExecutor, question: str) -> None:
+        self._grounder, self._graph, self._names = executor, executor.graph, executor.names
         self._dialogue = Dialogue(model, question)
-        self._grams = _grams(question)
+        self._question_phrases = _question_phrases(question)
         self._notes: list[str] = ["read level by level (deductive mode)"]
 
-    def run(self) -> tuple[Kept, Ranking]:
+    def run(self) -> tuple[LevelSelection, Ranking]:
         floors = self._graph.layer("floor")
-        on = self._narrow("floor", _Level(floors, floors))
-        rooms = self._narrow("room", _Level(self._below(on.targets), self._below(on.anchors)))
-        places = self._narrow("location", _Level(self._parts(rooms.targets), self._parts(rooms.anchors)))
-        things = self._narrow("object", _Level(self._things(places.targets), self._things(places.anchors)))
+        on = self._narrow("floor", _LevelNodes(floors, floors))
+        rooms = self._narrow("room", _LevelNodes(self._below(on.targets), self._below(on.anchors)))
+        places = self._narrow("location", _LevelNodes(self._parts(rooms.targets), self._parts(rooms.anchors)))
+        things = self._narrow("object", _LevelNodes(self._things(places.targets), self._things(places.anchors)))
         targets = list(things.targets)[:MAX_TARGETS]
         anchors = list(things.anchors)[:MAX_ANCHORS]  # may be targets, too: "the chair beside the other chair"
         if len(targets) < len(things.targets):
             self._notes.append(f"of {len(things.targets)} targets the first {len(targets)} were compared")
-        reading = Kept(
+        reading = LevelSelection(
             floors=on.ids,
             rooms=rooms.ids,
             locations=tuple(one for one in places.ids if one.startswith("L")),
@@ -112,7 +112,7 @@ class _Flow:
     def _things(self, places: Sequence[Node]) -> list[Node]:
         return [node for place in places for node in self._graph.children(place.id) if node.layer == "object"]
 
-    def _narrow(self, layer: str, within: _Level) -> _Level:
+    def _narrow(self, layer: str, within: _LevelNodes) -> _LevelNodes:
         """Let the model keep some of a level; all of it where there is nothing to choose from."""
         nodes = within.both
         nothing_to_choose = len(nodes) < 2 if layer != "object" else not nodes
@@ -123,14 +123,14 @@ class _Flow:
         step = "deduce_objects" if layer == "object" else "deduce_places"
         entries = [Entry(node.id, self._described(node)) for node in ranked[:MAX_LISTED]]
         found = self._dialogue.select(step, entries, [entry.id for entry in entries if entry.id in possible])
-        self._notes += _said(layer, len(nodes), found)
+        self._notes += _selection_notes(layer, len(nodes), found)
         if not found.targets and layer != "object":
             self._notes.append(f"no {layer} was kept for the target: all were searched")
             return within
         by_id = self._graph.nodes
         anchors = [by_id[one] for one in found.anchors]
         # where no place is named for the anchors, they are looked for where the target is
-        return _Level([by_id[one] for one in found.targets], anchors or ([] if layer == "object" else within.targets))
+        return _LevelNodes([by_id[one] for one in found.targets], anchors or ([] if layer == "object" else within.targets))
 
     def _ranked(self, nodes: Sequence[Node]) -> list[Node]:
         """The nodes by how well words of the question name them, or what they hold; equal ones by id."""
@@ -139,7 +139,7 @@ class _Flow:
         def fit(node: Node) -> float:
             said = {tag.name for tag in node.tags} | ({one.name for one in self._contents(node)} - {node.layer})
             for name in said - known.keys():
-                known[name] = max((self._names.likeness(gram, name) for gram in self._grams), default=0.0)
+                known[name] = max((self._names.similarity(phrase, name) for phrase in self._question_phrases), default=0.0)
             return max((known[name] for name in said), default=0.0)
 
         return sorted(nodes, key=lambda node: (-fit(node), id_key(node.id)))
@@ -216,13 +216,13 @@ class _Flow:
         return "; ".join([f"{self._object(node)}, {size} m", *said])
 
 
-def _grams(question: str) -> list[str]:
+def _question_phrases(question: str) -> list[str]:
     """Single words and pairs of neighbours of a question, without marks."""
     words = [word for word in tokens(question) if word[0].isalnum()]
     return list(dict.fromkeys([*words, *(f"{a} {b}" for a, b in pairwise(words))]))
 
 
-def _said(layer: str, count: int, found: Selection) -> list[str]:
+def _selection_notes(layer: str, count: int, found: Selection) -> list[str]:
     """What was kept of a level and why, and what the model was not shown."""
     kept = ", ".join(found.targets) or "none"
     anchors = f", and {', '.join(found.anchors)} to tell it by" if found.anchors else ""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from placegraph.nodes.grounding.program_executor import Grounder
-from placegraph.nodes.grounding.relations import HOLDS, Case, families
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
+from placegraph.nodes.grounding.relations import HOLDS, RelationQuery, relations_by_name
 from placegraph.runtime.language.textualization import plain
 from placegraph.runtime.scene_graph import Node
 from placegraph.runtime.vision.geometry import box_distance_m
@@ -21,26 +21,26 @@ MARGIN = 0.1  # departs: how much better than its opposite; a relation may fall 
 WORDS = {"left": "left of", "right": "right of", "front": "in front of"}  # as they read before a noun
 
 
-def edges(grounder: Grounder, target: Node, anchors: Sequence[Node], most: int) -> list[str]:
+def edges(executor: ProgramExecutor, target: Node, anchors: Sequence[Node], most: int) -> list[str]:
     """The edges of a target, `0.40 m from bed O7, left of bed O7`: one text for each of its `most` nearest anchors."""
     others = [anchor for anchor in anchors if anchor.id != target.id]
     gaps = [box_distance_m(target.box, anchor.box) for anchor in others]
     nearest = sorted(range(len(others)), key=lambda i: (gaps[i], i))[:most]
-    return [_edge(grounder, target, others[i], gaps[i]) for i in nearest]
+    return [_edge(executor, target, others[i], gaps[i]) for i in nearest]
 
 
-def _edge(grounder: Grounder, target: Node, anchor: Node, gap_m: float) -> str:
-    graph = grounder.graph
+def _edge(executor: ProgramExecutor, target: Node, anchor: Node, gap_m: float) -> str:
+    graph = executor.graph
     apart = ", in another room" if graph.room_of(target.id) != graph.room_of(anchor.id) else ""
     name = f"{plain(anchor.name, anchor.layer)} {anchor.id}"
-    fits = {relation: _fit(grounder, relation, target, anchor) for relation in SEMANTIC}
+    fits = {relation: _fit(executor, relation, target, anchor) for relation in SEMANTIC}
     how = [one for one in SEMANTIC if fits[one] >= HOLDS and fits[one] > fits.get(OPPOSITE.get(one, ""), 0.0) + MARGIN]
     words = [WORDS.get(one, one) for one in how if one != "in" or "on" not in how]  # "in" holds for what lies on, too
     return ", ".join([f"{gap_m:.2f} m from {name}{apart}", *(f"{one} {name}" for one in words)])
 
 
-def _fit(grounder: Grounder, relation: str, target: Node, anchor: Node) -> float:
-    layout = grounder.layout
+def _fit(executor: ProgramExecutor, relation: str, target: Node, anchor: Node) -> float:
+    layout = executor.layout
     one, other = (layout.all.take([layout.row[node.id]]) for node in (target, anchor))
-    fits = families()[relation].judge(Case(relation, one, other, layout, grounder.views))
+    fits = relations_by_name()[relation].evaluate(RelationQuery(relation, one, other, layout, executor.viewpoints))
     return float(fits.values[0, 0])

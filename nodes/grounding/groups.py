@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.program import Condition
-from placegraph.nodes.grounding.relations import apart_m, gaps_m
+from placegraph.nodes.grounding.relations import axis_gaps_m, distance_m
 from placegraph.runtime.arrays import F64, I64
 
 ALONE_M = 2.0  # departs: what has nothing like it within this is by itself; at half of it it may be
@@ -28,7 +28,7 @@ def group_fits(boxes: Boxes, rows: I64, condition: Condition) -> tuple[F64, Call
     if len(rows) > MAX_PEERS:
         return values, lambda i: ""
     peers = boxes.take(rows)
-    gap = apart_m(gaps_m(peers, peers))
+    gap = distance_m(axis_gaps_m(peers, peers))
     if condition.name == "alone":
         np.fill_diagonal(gap, np.inf)
         told = gap.min(axis=1) if len(rows) > 1 else np.full(len(rows), ALONE_M)

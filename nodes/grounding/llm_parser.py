@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 
 from placegraph.nodes.grounding.program import SAME_KIND, Thing
-from placegraph.nodes.grounding.program_syntax import grammar, read
+from placegraph.nodes.grounding.program_syntax import parse_program, program_grammar
 from placegraph.runtime.errors import ModelError, QueryError
 from placegraph.runtime.language.language_model import LanguageModel, ReplyCut, prompt
 from placegraph.runtime.language.word_forms import tokens
@@ -25,7 +25,7 @@ REPLY_TOKENS = 96  # departs: 57 are the most of 2,000 generated programs; a rep
 
 
 @dataclass(frozen=True)
-class Reading:
+class ParsedRequest:
     """What was read, and how likely the model found just this program (0 to 1)."""
 
     thing: Thing | None  # None: what the model wrote did not end
@@ -42,17 +42,17 @@ def default_adapter_path() -> Path:
     return path
 
 
-def asked(text: str) -> str:
+def model_input(text: str) -> str:
     """What stands between OPENING and the reply: the request's words as the grammar knows them."""
     return " ".join(tokens(text)) + CLOSING
 
 
-def reply(program: str) -> str:
+def model_output(program: str) -> str:
     """A program's text as the model writes it."""
     return f" {program}\n"
 
 
-def read_request(model: LanguageModel, text: str, *, adapted: bool = True) -> Reading:
+def parse_by_model(model: LanguageModel, text: str, *, adapted: bool = True) -> ParsedRequest:
     """The thing that a request describes.
 
     A program that does not end has no confidence at all. Raises QueryError for a request without a word or of over
@@ -61,25 +61,25 @@ def read_request(model: LanguageModel, text: str, *, adapted: bool = True) -> Re
     return _read(model, text, OPENING, adapted)
 
 
-def read_by_examples(model: LanguageModel, text: str) -> Reading:
+def parse_by_examples(model: LanguageModel, text: str) -> ParsedRequest:
     """The same by the model as it comes, with examples in the prompt instead of an adapter. Raises QueryError."""
     return _read(model, text, prompt(__package__, "read") + "\n", adapted=False)
 
 
-def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Reading:
+def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> ParsedRequest:
     words = len(tokens(text))
     if words > MAX_WORDS:
         raise QueryError(f"the request has {words} words and marks; at most {MAX_WORDS} are read")
     try:
-        said = model.complete(asked(text), grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
+        said = model.complete(model_input(text), program_grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
     except ReplyCut:
-        return Reading(None, 0.0)
-    return Reading(with_noun(read(said.text)), math.exp(said.log_probability))
+        return ParsedRequest(None, 0.0)
+    return ParsedRequest(resolve_same_kind(parse_program(said.text)), math.exp(said.log_probability))
 
 
-def with_noun(thing: Thing) -> Thing:
+def resolve_same_kind(thing: Thing) -> Thing:
     """A target that is called "one" gets the noun of what is looked at: "facing the lamps, the one on the left"."""
-    faced = next(thing.said("looking"), None)
+    faced = next(thing.conditions_named("looking"), None)
     if thing.noun != SAME_KIND or faced is None or faced.things[0].noun == SAME_KIND:
         return thing
     return thing.model_copy(update={"noun": faced.things[0].noun})

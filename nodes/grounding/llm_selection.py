@@ -75,7 +75,7 @@ class Dialogue:
     def fits(self, step: str, entries: Sequence[Entry]) -> bool:
         """Whether these entries can be offered in one call of `choose`."""
         opening, middle, closing = self._parts(step)
-        return self._model.fits(opening, _filled(middle, entries), _longest_choice(entries), closing)
+        return self._model.fits(opening, _with_entries(middle, entries), _longest_choice(entries), closing)
 
     def choose(self, step: str, entries: Sequence[Entry]) -> tuple[str, str]:
         """The id of the one entry that is meant or "none", and why. Raises QueryError when they do not fit."""
@@ -100,7 +100,7 @@ class Dialogue:
     def _ask(self, step: str, entries: Sequence[Entry], grammar: str, longest: int) -> str:
         """The only place where this mode calls the model."""
         opening, middle, closing = self._parts(step)
-        reply = self._model.complete(_filled(middle, entries), grammar, longest, opening=opening, closing=closing)
+        reply = self._model.complete(_with_entries(middle, entries), grammar, longest, opening=opening, closing=closing)
         return reply.text
 
     def _pages(self, step: str, entries: Sequence[Entry], longest: int) -> list[list[Entry]]:
@@ -109,7 +109,7 @@ class Dialogue:
         pages: list[list[Entry]] = []
         for entry in entries:
             grown = [*pages[-1], entry] if pages else [entry]
-            if pages and self._model.fits(opening, _filled(middle, grown), longest, closing):
+            if pages and self._model.fits(opening, _with_entries(middle, grown), longest, closing):
                 pages[-1] = grown
             elif len(pages) > MAX_CALLS:
                 break  # it will not be shown
@@ -118,24 +118,24 @@ class Dialogue:
         return pages
 
 
-class _Reply(BaseModel):
+class _SelectionReply(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
     reason: str
 
 
-Form = TypeVar("Form", bound=_Reply)
+ReplyModel = TypeVar("Form", bound=_SelectionReply)
 
 
-class _Selected(_Reply):
+class _Selected(_SelectionReply):
     targets: list[str]
     anchors: list[str]
 
 
-class _Chosen(_Reply):
+class _Chosen(_SelectionReply):
     object: str
 
 
-def _read(reply: str, form: type[Form]) -> Form:
+def _read(reply: str, form: type[ReplyModel]) -> ReplyModel:
     try:
         return form.model_validate(json.loads(reply))
     except (json.JSONDecodeError, ValidationError):
@@ -148,7 +148,7 @@ def _check(ids: Sequence[str], offered: Sequence[str]) -> None:
             raise QueryError(f"the language model chose {one!r}, which was not offered")
 
 
-def _filled(asked: str, entries: Sequence[Entry]) -> str:
+def _with_entries(asked: str, entries: Sequence[Entry]) -> str:
     return asked.replace("{entries}", "\n".join(f"{entry.id}: {entry.text}" for entry in entries))
 
 
@@ -191,12 +191,12 @@ def _list(rule: str, least: int) -> str:
 
 def _longest_selection(entries: Sequence[Entry]) -> int:
     """Tokens of the longest selection that the grammar allows, at most: no token is shorter than a letter."""
-    return len('{"reason": "", "targets": [], "anchors": []}') + MAX_REASON + 2 * MAX_CHOSEN * (_widest(entries) + 4)
+    return len('{"reason": "", "targets": [], "anchors": []}') + MAX_REASON + 2 * MAX_CHOSEN * (_max_id_length(entries) + 4)
 
 
 def _longest_choice(entries: Sequence[Entry]) -> int:
-    return len('{"reason": "", "object": ""}') + MAX_REASON + max(_widest(entries), len(NONE))
+    return len('{"reason": "", "object": ""}') + MAX_REASON + max(_max_id_length(entries), len(NONE))
 
 
-def _widest(entries: Sequence[Entry]) -> int:
+def _max_id_length(entries: Sequence[Entry]) -> int:
     return max((len(entry.id) for entry in entries), default=0)

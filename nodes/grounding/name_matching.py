@@ -29,7 +29,7 @@ MAX_KEPT = 50_000  # pairs of words whose likeness is remembered
 
 
 @dataclass(frozen=True)
-class Fit:
+class NameMatch:
     """How well a noun names one node, 0..1, and the tag that decided it."""
 
     node: Node
@@ -37,21 +37,21 @@ class Fit:
     tag: str
 
 
-class Names:
+class NameMatcher:
     """Compares nouns with tags."""
 
     def __init__(self, encode: Encode) -> None:
         self._encode = encode
-        self._likeness: dict[tuple[str, str], float] = {}
+        self._similarity: dict[tuple[str, str], float] = {}
         self._rows: dict[str, F32] = {}
 
-    def likeness(self, noun: str, tag: str) -> float:
+    def similarity(self, noun: str, tag: str) -> float:
         """How well a noun names a thing with this tag, 0..1; 0: not at all. Both in any form."""
-        if (noun, tag) not in self._likeness:
-            if len(self._likeness) >= MAX_KEPT:
-                self._likeness.clear()
-            self._likeness[noun, tag] = self._compare(normal_form(noun), normal_form(tag))
-        return self._likeness[noun, tag]
+        if (noun, tag) not in self._similarity:
+            if len(self._similarity) >= MAX_KEPT:
+                self._similarity.clear()
+            self._similarity[noun, tag] = self._compare(normal_form(noun), normal_form(tag))
+        return self._similarity[noun, tag]
 
     def _compare(self, noun: str, tag: str) -> float:
         if not noun or not tag:
@@ -66,9 +66,9 @@ class Names:
 
     def cosine(self, a: str, b: str) -> float:
         """Cosine of two phrases' embeddings."""
-        return float(self._row(a) @ self._row(b))
+        return float(self._in_front_of_row(a) @ self._in_front_of_row(b))
 
-    def _learn(self, nodes: Sequence[Node]) -> None:
+    def _encode_tags(self, nodes: Sequence[Node]) -> None:
         """Encode all their tags at once: one at a time takes a hundred times as long."""
         if len(self._rows) >= MAX_KEPT:
             self._rows.clear()
@@ -76,52 +76,52 @@ class Names:
         if unknown:
             self._rows.update(zip(unknown, self._encode(unknown), strict=True))
 
-    def _row(self, text: str) -> F32:
+    def _in_front_of_row(self, text: str) -> F32:
         if text not in self._rows:
             if len(self._rows) >= MAX_KEPT:
                 self._rows.clear()
             self._rows[text] = self._encode([text])[0]
         return self._rows[text]
 
-    def fit(self, noun: str, node: Node) -> Fit:
+    def fit(self, noun: str, node: Node) -> NameMatch:
         """How well a noun names a node, over its tags; an id names exactly its node, an empty noun everything."""
         if not noun:
-            return Fit(node, 1.0, node.name)
+            return NameMatch(node, 1.0, node.name)
         if ID_PATTERN.fullmatch(noun.upper()):
-            return Fit(node, float(noun.upper() == node.id), node.id)
-        return self._best(noun, node, self.likeness)
+            return NameMatch(node, float(noun.upper() == node.id), node.id)
+        return self._best(noun, node, self.similarity)
 
     @staticmethod
-    def _best(noun: str, node: Node, likeness: Callable[[str, str], float]) -> Fit:
-        best = Fit(node, 0.0, "")
+    def _best(noun: str, node: Node, similarity: Callable[[str, str], float]) -> NameMatch:
+        best = NameMatch(node, 0.0, "")
         strongest = max((tag.weight for tag in node.tags), default=0.0)
         for tag in node.tags:
             share = tag.weight / strongest if strongest > 0 else 1.0
-            score = likeness(noun, tag.name) * (0.5 + 0.5 * share) if share >= TAG_SHARE else 0.0
+            score = similarity(noun, tag.name) * (0.5 + 0.5 * share) if share >= TAG_SHARE else 0.0
             if score > best.score:
-                best = Fit(node, score, tag.name)
+                best = NameMatch(node, score, tag.name)
         return best
 
-    def called(self, noun: str, nodes: Sequence[Node]) -> list[Fit]:
+    def matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
         """All nodes that the noun names, well or less well, in the order given."""
-        self._learn(nodes)
+        self._encode_tags(nodes)
         return [fit for fit in (self.fit(noun, node) for node in nodes) if fit.score > 0]
 
-    def fair(self, noun: str, nodes: Sequence[Node]) -> list[Fit]:
+    def nearest_matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
         """Where nothing is called so: the nodes whose name is the most like the noun, if that is fair; else none."""
         if not noun or ID_PATTERN.fullmatch(noun.upper()):
             return []
-        self._learn(nodes)
-        fits = [self._best(normal_form(noun), node, self._loose) for node in nodes]
+        self._encode_tags(nodes)
+        fits = [self._best(normal_form(noun), node, self._cosine_similarity) for node in nodes]
         best = max((fit.score for fit in fits), default=0.0)
         return [fit for fit in fits if best >= FAIR and fit.score >= best - STEP / 2]
 
-    def _loose(self, noun: str, tag: str) -> float:
+    def _cosine_similarity(self, noun: str, tag: str) -> float:
         return max(self.cosine(noun, normal_form(tag)), 0.0)
 
-    def named(self, noun: str, nodes: Sequence[Node], step: float = STEP) -> list[Fit]:
+    def best_matches(self, noun: str, nodes: Sequence[Node], step: float = STEP) -> list[NameMatch]:
         """The nodes that the noun names best, in the order given: those within `step` (0..1) of the best fit."""
-        fits = self.called(noun, nodes)
+        fits = self.matches(noun, nodes)
         best = max((fit.score for fit in fits), default=0.0)
         return [fit for fit in fits if fit.score >= best - step]
 
@@ -129,7 +129,7 @@ class Names:
         """Whether any of the nodes is called so."""
         return any(self.fit(noun, node).score > 0 for node in nodes)
 
-    def nearest(self, noun: str, nodes: Iterable[Node], most: int = NEAREST_NAMES) -> list[str]:
+    def nearest_names(self, noun: str, nodes: Iterable[Node], most: int = NEAREST_NAMES) -> list[str]:
         """The names in the map most like a noun, best first, at most so many."""
         names = sorted({node.tags[0].name for node in nodes if node.tags})
         if not names or not noun:
@@ -149,7 +149,7 @@ def _by_words(noun: str, tag: str) -> float:
         return SYNONYM + SHARED * noun.endswith(f" {tag}")  # of a duffel bag: a bag before a backpack
     if tag in kinds().get(noun, ()):
         return MEMBER  # a chair is a seat
-    if is_slip(noun, tag):
+    if is_misspelling(noun, tag):
         return SLIP
     if noun.endswith(f" {tag}"):
         return HEAD  # a "wooden chair" may be tagged chair
@@ -164,7 +164,7 @@ def _by_words(noun: str, tag: str) -> float:
                 found = max(found, worth * (SYNONYM if own != other else 0.9))
             elif other in kinds().get(own, ()):
                 found = max(found, worth * MEMBER)
-            elif is_slip(own, other):
+            elif is_misspelling(own, other):
                 found = max(found, worth * SLIP)
     return found
 
@@ -183,7 +183,7 @@ def _heads(text: str) -> list[str]:
     return [" ".join(words[i:]) for i in range(len(words))]
 
 
-def is_slip(noun: str, word: str) -> bool:
+def is_misspelling(noun: str, word: str) -> bool:
     """Whether a noun is another word with one wrong letter, or two where both are long."""
     shorter = min(len(noun), len(word))
     most = 0 if shorter < SLIP_LETTERS[0] else 1 if shorter < SLIP_LETTERS[1] else 2

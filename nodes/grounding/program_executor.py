@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes, Layout, layout_of
-from placegraph.nodes.grounding.conditions import NOT_THINGS, Conditions, says
-from placegraph.nodes.grounding.name_matching import Fit, Names
+from placegraph.nodes.grounding.conditions import SURFACE_NAMES, ConditionScorer, names_a_kind
+from placegraph.nodes.grounding.name_matching import NameMatch, NameMatcher
 from placegraph.nodes.grounding.program import SAME_KIND, Program, Thing
 from placegraph.nodes.grounding.ranking import TIE, Candidate, Ranking
-from placegraph.nodes.grounding.scoring import Weighing
-from placegraph.nodes.grounding.search_scope import Scope, narrow, places_called
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.scoring import ScoredCandidates
+from placegraph.nodes.grounding.search_scope import SearchScope, match_places, narrow_scope
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
@@ -26,7 +26,7 @@ MAX_LISTED = 50  # departs: candidates told with evidence; no request may ask fo
 FAR_BETTER = 2.0  # departs: what holds by a hair does not go before what is so much better but for one condition
 FACED = 0.9  # departs: anchors of a view that fit nearly as well as the best vote on where it looks
 BESIDE_M, STOREY_M = 1.5, 2.0  # departs: who stands so near to one of several doors means that one
-DOORS = frozenset(
+ENTRANCE_WORDS = frozenset(
     ("enter", "entering", "entered", "the", "room", "into", "through", "stepping", "walks", "inside",
      "entrance", "enters", "entry", "exit", "walk", "walking", "come", "coming", "in", "doorway",
      "walked", "entered", "step", "outside", "entryway")
@@ -34,20 +34,20 @@ DOORS = frozenset(
 
 
 @dataclass(frozen=True)
-class Viewpoint:
+class ReportedViewpoint:
     """From where left, right, front and behind are meant: (3,) metres, world frame, and whose place that is."""
 
     source: str  # "asker", "room centre", "place before window O4", "door O2"
     xyz_world: F64
 
 
-class Grounder:
+class ProgramExecutor:
     """Ranks targets in one graph, seen from one place."""
 
     def __init__(
         self,
         graph: SceneGraph,
-        names: Names,
+        names: NameMatcher,
         asker_world: F64,
         heading_rad: float = np.nan,
         layout: Layout | None = None,
@@ -59,64 +59,64 @@ class Grounder:
         self.graph, self.names = graph, names
         self.asker_world = asker_world
         self.layout = layout or layout_of(graph)
-        self.views = Views(self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw)
+        self.viewpoints = ViewpointSelector(self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw)
 
-    def viewpoint(self, node: Node) -> Viewpoint:
+    def viewpoint(self, node: Node) -> ReportedViewpoint:
         """From where a node is seen: the place that the request names, the asker's, else the centre of its room."""
-        view = self.views.named
+        viewpoint = self.viewpoints.explicit
         height = float(node.center[2])
-        if view is self.views.asker and view is not None:
-            return Viewpoint("asker", self.asker_world)
-        if view is not None:
-            return Viewpoint(view.source, self.layout.to_world(np.array([*view.eye, height])))
+        if viewpoint is self.viewpoints.asker and viewpoint is not None:
+            return ReportedViewpoint("asker", self.asker_world)
+        if viewpoint is not None:
+            return ReportedViewpoint(viewpoint.source, self.layout.to_world(np.array([*viewpoint.eye, height])))
         room = self.graph.room_of(node.id)
         center = (self.graph.nodes[room] if room else self.graph.building).center
-        return Viewpoint("room centre", center)
+        return ReportedViewpoint("room centre", center)
 
-    def scope(self, target: Thing) -> Scope:
+    def scope(self, target: Thing) -> SearchScope:
         """Where the target's place words say to look."""
-        everywhere = Scope(self.graph.layer("object"), [])
-        return narrow(self.graph, target, self.names, self._conditions(everywhere, Ranking()).rank_places)
+        everywhere = SearchScope(self.graph.layer("object"), [])
+        return narrow_scope(self.graph, target, self.names, self._conditions(everywhere, Ranking()).rank_places)
 
-    def rank(self, program: Program, scope: Scope | None = None) -> Ranking:
+    def rank(self, program: Program, scope: SearchScope | None = None) -> Ranking:
         """Candidates of the scope for the program's target; empty when nothing is called so, or nothing fits."""
         scope = scope or self.scope(program.target)
         ranking = Ranking(notes=list(scope.notes), sure=scope.sure)
         conditions, thing = self._conditions(scope, ranking), scope.thing
-        self._look_from(thing, conditions)
-        fits = self._targets(thing.noun, scope, ranking)
+        self._choose_viewpoint(thing, conditions)
+        fits = self._match_targets(thing.noun, scope, ranking)
         if fits:
-            self._list(ranking, thing, conditions.weigh(thing, conditions.boxes(fits), fits, thing), fits)
+            self._fill_ranking(ranking, thing, conditions.score(thing, conditions.boxes(fits), fits, thing), fits)
         return ranking
 
-    def _beside_asker(self, things: Boxes) -> Boxes:
+    def _nearest_to_asker(self, things: Boxes) -> Boxes:
         """Of several things that one may stand at, those that the asker does stand at, if any."""
         away = np.linalg.norm(things.center[:, :2] - self.asker_world[:2], axis=1)
         level = np.abs(things.low[:, 2] - self.asker_world[2]) <= STOREY_M
         here = np.flatnonzero((away <= BESIDE_M) & level)
         return things.take(here) if len(here) else things
 
-    def _conditions(self, scope: Scope, ranking: Ranking) -> Conditions:
-        return Conditions(self.graph, self.names, self.layout, self.views, scope, ranking)
+    def _conditions(self, scope: SearchScope, ranking: Ranking) -> ConditionScorer:
+        return ConditionScorer(self.graph, self.names, self.layout, self.viewpoints, scope, ranking)
 
     @staticmethod
-    def _list(ranking: Ranking, thing: Thing, weighing: Weighing, fits: Sequence[Fit]) -> None:
+    def _fill_ranking(ranking: Ranking, thing: Thing, scored: ScoredCandidates, fits: Sequence[NameMatch]) -> None:
         """Put the best into the ranking, those that hold before the others."""
-        scores = weighing.scores
-        keys = [(not weighing.holds[i], -scores[i], id_key(fits[i].node.id)) for i in range(len(fits))]
+        scores = scored.scores
+        keys = [(not scored.holds[i], -scores[i], id_key(fits[i].node.id)) for i in range(len(fits))]
         listed = sorted(range(len(fits)), key=keys.__getitem__)
         if scores.max() > FAR_BETTER * scores[listed[0]]:
             listed = sorted(listed, key=lambda i: (-scores[i], keys[i]))
         for i in listed[:MAX_LISTED]:
-            called = [f"{weighing.boxes.labels[i]} is called {fits[i].tag}"] if says(thing.noun) else []
-            evidence = [*called, *weighing.evidence(i)]
-            ranking.candidates.append(Candidate(fits[i].node, float(scores[i]), evidence, bool(weighing.holds[i])))
+            called = [f"{scored.boxes.labels[i]} is called {fits[i].tag}"] if names_a_kind(thing.noun) else []
+            evidence = [*called, *scored.evidence(i)]
+            ranking.candidates.append(Candidate(fits[i].node, float(scores[i]), evidence, bool(scored.holds[i])))
         best = ranking.candidates[0]
         ranking.sure &= best.holds
-        if says(thing.noun):
+        if names_a_kind(thing.noun):
             return
-        related = any(one.kind == "relation" and not one.negated for one in thing.conditions)
-        if not best.holds and related and thing.noun != SAME_KIND:
+        match_anchors = any(one.kind == "relation" and not one.negated for one in thing.conditions)
+        if not best.holds and match_anchors and thing.noun != SAME_KIND:
             # "what is under the bed?": of anything, only what is there is an answer
             ranking.notes += best.evidence
             ranking.candidates.clear()
@@ -124,34 +124,34 @@ class Grounder:
             ranking.note("nothing that is said tells one thing from another")
             ranking.candidates.clear()
 
-    def _targets(self, noun: str, scope: Scope, ranking: Ranking) -> list[Fit]:
+    def _match_targets(self, noun: str, scope: SearchScope, ranking: Ranking) -> list[NameMatch]:
         """What the noun names in the scope: objects, or places where those bear the name better."""
-        if not says(noun):
-            return [Fit(node, 1.0, node.name) for node in scope.objects if node.name not in NOT_THINGS]
-        objects = self.names.called(noun, scope.objects)
-        places = places_called(noun, scope.places, self.names)
+        if not names_a_kind(noun):
+            return [NameMatch(node, 1.0, node.name) for node in scope.objects if node.name not in SURFACE_NAMES]
+        objects = self.names.matches(noun, scope.objects)
+        places = match_places(noun, scope.places, self.names)
         best = max((fit.score for fit in objects), default=0.0)
         if any(fit.score > best for fit in places):
             return places
         if not objects and not self.names.is_known(noun, self.graph.layer("object")):
-            objects = self.names.fair(noun, scope.objects)
+            objects = self.names.nearest_matches(noun, scope.objects)
             if objects:
                 ranking.note(f"nothing is called {noun}; {objects[0].tag} is the nearest name")
         return objects
 
-    def _look_from(self, thing: Thing, conditions: Conditions) -> None:
+    def _choose_viewpoint(self, thing: Thing, conditions: ConditionScorer) -> None:
         """Find the view that the request names."""
-        self.views.said = None
+        self.viewpoints.requested = None
         for condition in (one for one in thing.conditions if one.kind == "view"):
             inner = condition.things[0]
             said = set(normal_form(inner.noun).split())
-            if said and said <= DOORS:
+            if said and said <= ENTRANCE_WORDS:
                 inner = inner.model_copy(update={"noun": "door"})
             found = conditions.anchors(inner, thing, 1)
             if found is None:
                 conditions.ranking.note(f"nothing in the map is called {inner.noun}, so nobody looks from there")
                 continue
-            best = self._beside_asker(found.best(level=FACED))
-            makers = {"from": self.views.at, "back": self.views.away, "looking": self.views.facing_most}
-            self.views.said = makers[condition.name](best)
-            conditions.forget()  # what was found before was seen from elsewhere
+            best = self._nearest_to_asker(found.best(level=FACED))
+            makers = {"from": self.viewpoints.at, "back": self.viewpoints.with_back_to, "looking": self.viewpoints.in_front_of_most}
+            self.viewpoints.requested = makers[condition.name](best)
+            conditions.clear_anchors()  # what was found before was seen from elsewhere

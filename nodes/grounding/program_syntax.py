@@ -21,7 +21,7 @@ from placegraph.nodes.grounding.program import (
     MAX_DEPTH,
     SAME_KIND,
     Condition,
-    Form,
+    ConditionForm,
     Thing,
 )
 from placegraph.runtime.errors import QueryError
@@ -36,7 +36,7 @@ NEVER_FIRST = frozenset(
 )  # fmt: skip
 
 
-def read(text: str) -> Thing:
+def parse_program(text: str) -> Thing:
     """A program's text as a thing; raises QueryError saying what was expected where."""
     lexemes, at = [], 0
     text = text.strip()
@@ -113,7 +113,7 @@ class _Reader:
             raise QueryError(f"program {self.text!r}: {error.errors()[0]['msg']}") from None
 
 
-def write(thing: Thing) -> str:
+def format_program(thing: Thing) -> str:
     """A thing as a program's text."""
     return "; ".join([thing.noun or ANYTHING, *map(_condition, thing.conditions)])
 
@@ -128,11 +128,11 @@ def _condition(condition: Condition) -> str:
     if condition.number and not (condition.number == 1 and CONDITIONS[condition.name].number == "may"):
         parts.append(str(condition.number))
     if condition.things:
-        parts.append(f"({', '.join(map(write, condition.things))})")
+        parts.append(f"({', '.join(map(format_program, condition.things))})")
     return " ".join(parts)
 
 
-def grammar(text: str) -> str:
+def program_grammar(text: str) -> str:
     """GBNF of all programs of a request: " ", a thing, a newline. Raises QueryError when the request has no word."""
     words = tokens(text)
     spans = [f's{i} ::= "{word}"' + _onward(words, i) for i, word in enumerate(words) if word[0].isalnum()]
@@ -161,7 +161,7 @@ def _onward(words: Sequence[str], i: int) -> str:
     return f' (" " s{i + 1})?' if following else ""
 
 
-def _rule(name: str, form: Form, depth: int) -> str:
+def _rule(name: str, form: ConditionForm, depth: int) -> str:
     """GBNF of one condition at a depth; "" where its things would lie too deep."""
     if name == "is":
         return '"is " said'

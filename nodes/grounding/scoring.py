@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
-from placegraph.nodes.grounding.relations import HOLDS, order
+from placegraph.nodes.grounding.relations import HOLDS, rank_positions
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.scene_graph import Node
 
@@ -26,7 +26,7 @@ MEASURED = 0.6  # departs: how much of a runner-up's score its distance in the m
 Sentence = Callable[[int], str]
 
 
-class Weighing:
+class ScoredCandidates:
     """The state of n things while their conditions are applied."""
 
     def __init__(self, boxes: Boxes, nodes: Sequence[Node | None], names: F64, *, narrowed: bool) -> None:
@@ -38,16 +38,16 @@ class Weighing:
         groups = [names >= best - step for step in NAME_STEPS]
         # who says more than the name has a name that does not tell: then others must be called so too
         told = next((group for group in groups if group.sum() > 1), groups[0]) if narrowed else groups[0]
-        self.single = bool(groups[0].sum() == 1)  # one thing alone bears the name
+        self.is_unique = bool(groups[0].sum() == 1)  # one thing alone bears the name
         self.peers: Bool = told
         self.scores = np.where(told, self.scores, OFF_NAME * self.scores)
         self.holds: Bool = groups[-1]
-        self._ranked: Bool | None = None  # what all ranks are said of
+        self._rankable: Bool | None = None  # what all ranks are said of
 
     def __len__(self) -> int:
         return len(self.boxes)
 
-    def judged(self, values: F64, sentence: Sentence, *, trust: float = 1.0, negated: bool = False) -> None:
+    def apply_fits(self, values: F64, sentence: Sentence, *, trust: float = 1.0, negated: bool = False) -> None:
         """Apply a condition's fits (n,), 0..1; negated: it is said not to be so."""
         fits = 1.0 - values if negated else values
         holds = fits >= HOLDS - 1e-9
@@ -55,30 +55,30 @@ class Weighing:
         self.holds = self.holds & holds
         self.sentences.append(lambda i: sentence(i) if holds[i] else f"not as said: {sentence(i)}")
 
-    def hinted(self, values: F64, sentence: Sentence, trust: float) -> None:
+    def apply_hint(self, values: F64, sentence: Sentence, trust: float) -> None:
         """Let something speak for those that it fits, without force."""
         self.scores = self.scores * np.power(np.clip(values, MIN, 1.0), trust)
         self.sentences.append(sentence)
 
-    def among(self) -> Bool:
+    def rankable(self) -> Bool:
         """(n,) those that a rank is said of: what holds so far, else what comes near to it."""
-        if self._ranked is not None:
-            return self._ranked
+        if self._rankable is not None:
+            return self._rankable
         held = self.holds & self.peers
         if held.any():
             return held
         return np.asarray(self.peers & (self.scores >= 0.5 * self.scores[self.peers].max(initial=0.0)))
 
-    def ranked(
+    def apply_rank(
         self, measure: F64, number: int, margin: float, sentence: Sentence, *, trust: float, negated: bool
     ) -> None:
         """Apply a rank: measure (n,), greatest first; the number-th among those that hold is meant."""
-        self._ranked = self.among()
-        rows = np.flatnonzero(self._ranked & np.isfinite(measure))
+        self._rankable = self.rankable()
+        rows = np.flatnonzero(self._rankable & np.isfinite(measure))
         if len(rows) < number and int(self.peers.sum()) >= number:
             rows = np.flatnonzero(self.peers & np.isfinite(measure))  # the second of one: something was misread
         values = np.full(len(self), OUTRANKED)
-        places = order(measure[rows])
+        places = rank_positions(measure[rows])
         there = len(rows)
         reached = min(number, there)  # of three the fifth is misread or miscounted: the last one comes nearest to it
         if there:
@@ -96,7 +96,7 @@ class Weighing:
         def told(i: int) -> str:
             return f"{sentence(i)}, number {place[i]} of {there}{short}" if i in place else f"{sentence(i)}, set aside"
 
-        self.judged(values, told, trust=trust, negated=negated)
+        self.apply_fits(values, told, trust=trust, negated=negated)
 
     def evidence(self, i: int) -> list[str]:
         """The sentences about one of them."""

@@ -15,11 +15,11 @@ import numpy as np
 
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.camera import detect
-from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_by_examples, read_request
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, parse_by_examples, parse_by_model
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
 from placegraph.nodes.grounding.program import Program, Thing
-from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.program_syntax import parse_program
 from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, QueryError, SourceError
@@ -37,7 +37,7 @@ from placegraph.tools.simulator.true_graph import true_graph
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class QuestionScene:
     """A graph, the questions about it, and how its frame lies in that of the questions.
 
     true_from_graph: (4, 4) rigid transform. boxes: (2, 3) of each object by id, in the frame of the questions.
@@ -56,15 +56,15 @@ class Scene:
         return make_question(asked.text, mode=mode, pose=eye_in_map(asked, self.true_from_graph))
 
 
-def house_scene(seed: int, count: int) -> Scene:
+def house_scene(seed: int, count: int) -> QuestionScene:
     """The true graph of a house of a seed with up to `count` questions."""
     house = build(seed)
     graph = true_graph(house)
     boxes = {node.id: node.box for node in graph.layer("object")}
-    return Scene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes, true_ids=True)
+    return QuestionScene(f"house {seed}", graph, questions(house, seed, count), np.eye(4), boxes, true_ids=True)
 
 
-def map_scene(folder: Path, source: Path) -> Scene:
+def map_scene(folder: Path, source: Path) -> QuestionScene:
     """A map with the questions of its house. Raises SourceError where the house has none, SchemaError for the map."""
     asked = read_questions(source)
     if not asked:
@@ -73,22 +73,22 @@ def map_scene(folder: Path, source: Path) -> Scene:
     estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
     true_from_map = level_alignment(estimated, true)
     boxes = {one.id: one.box for one in read_aligned(folder, true_from_map).objects}
-    return Scene(str(folder), SceneGraph.load(find_graph(folder)), asked, true_from_map, boxes)
+    return QuestionScene(str(folder), SceneGraph.load(find_graph(folder)), asked, true_from_map, boxes)
 
 
-class Asker:
+class VariantRunner:
     """Asks questions in all variants; a request is read by the model once."""
 
     def __init__(self, threads: int = 1) -> None:
         self.model = LanguageModel(threads=threads, adapter_path=default_adapter_path())
-        names = Names(TextEncoder().encode)
+        names = NameMatcher(TextEncoder().encode)
         self.reasoner = Reasoner(names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
         self._read: dict[tuple[str, str], Program] = {}
         self._cost: dict[tuple[str, str], float] = {}  # ms of these readings: who is given one pays for it
         self._saved_ms, self._saved_calls = 0.0, 0
         self._flat: dict[str, SceneGraph] = {}
 
-    def ask(self, variant: str, scene: Scene, asked: AskedQuestion) -> Reply:
+    def ask(self, variant: str, scene: QuestionScene, asked: AskedQuestion) -> Reply:
         """The reply of one variant."""
         calls, began = self.model.calls, time.perf_counter()
         self._saved_ms, self._saved_calls = 0.0, 0
@@ -99,12 +99,12 @@ class Asker:
         ms = (time.perf_counter() - began) * 1e3 + self._saved_ms
         return Reply(fields["status"], fields["object_id"] or "", self.model.calls - calls + self._saved_calls, ms)
 
-    def by_mode(self, scene: Scene, asked: AskedQuestion, mode: str) -> dict[str, Any]:
+    def by_mode(self, scene: QuestionScene, asked: AskedQuestion, mode: str) -> dict[str, Any]:
         """The answer of one of the product's modes."""
         return self.reasoner.answer(scene.graph, 0, scene.question(asked, mode))
 
     def by_program(
-        self, scene: Scene, asked: AskedQuestion, program: Program, graph: SceneGraph | None = None
+        self, scene: QuestionScene, asked: AskedQuestion, program: Program, graph: SceneGraph | None = None
     ) -> dict[str, Any]:
         """The answer to a program that is given."""
         return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(asked), program)
@@ -117,14 +117,14 @@ class Asker:
         else:
             began = time.perf_counter()
             if how == "examples":
-                reading = read_by_examples(self.model, asked.text)
+                reading = parse_by_examples(self.model, asked.text)
             else:
-                reading = read_request(self.model, asked.text, adapted=how == "adapter")
+                reading = parse_by_model(self.model, asked.text, adapted=how == "adapter")
             self._read[key] = Program(target=reading.thing or Thing(noun=asked.text))
             self._cost[key] = (time.perf_counter() - began) * 1e3
         return self._read[key]
 
-    def flat(self, scene: Scene) -> SceneGraph:
+    def flat(self, scene: QuestionScene) -> SceneGraph:
         """The scene's objects in one room without a name."""
         if scene.name not in self._flat:
             self._flat[scene.name] = without_hierarchy(scene.graph)
@@ -136,7 +136,7 @@ class Variant:
     """One way to answer, and what it is."""
 
     what: str
-    answer: Callable[[Asker, Scene, AskedQuestion], dict[str, Any]]
+    answer: Callable[[VariantRunner, QuestionScene, AskedQuestion], dict[str, Any]]
 
 
 VARIANTS: Mapping[str, Variant] = {
@@ -172,7 +172,7 @@ def chosen_variants(names: str) -> list[str]:
 
 def true_program(asked: AskedQuestion) -> Program:
     """The program that the question was made from."""
-    return Program(target=read(asked.program))
+    return Program(target=parse_program(asked.program))
 
 
 def without_relations(program: Program) -> Program:

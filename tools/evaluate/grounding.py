@@ -75,15 +75,15 @@ def grounding_scores(
     overlap = np.array(ious)
     forms = np.array([question.form for question in questions], object)
     return {
-        "all": _row(overlap, replies),
+        "all": _score_row(overlap, replies),
         "forms": {
-            form: _row(overlap[forms == form], [r for r, f in zip(replies, forms, strict=True) if f == form])
+            form: _score_row(overlap[forms == form], [r for r, f in zip(replies, forms, strict=True) if f == form])
             for form in sorted(set(forms.tolist()))
         },
     }
 
 
-def _row(ious: F64, replies: Sequence[Reply]) -> dict[str, Any]:
+def _score_row(ious: F64, replies: Sequence[Reply]) -> dict[str, Any]:
     count = len(replies)
     status = [reply.status for reply in replies]
     return {

@@ -12,7 +12,14 @@ import numpy as np
 import typer
 
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.evaluate.ablations import VARIANTS, Asker, Scene, chosen_variants, house_scene, map_scene
+from placegraph.tools.evaluate.ablations import (
+    VARIANTS,
+    QuestionScene,
+    VariantRunner,
+    chosen_variants,
+    house_scene,
+    map_scene,
+)
 from placegraph.tools.evaluate.grounding import Reply, grounding_scores
 from placegraph.tools.evaluate.report import number, plain, table
 
@@ -36,10 +43,10 @@ def evaluate_grounding(
 ) -> None:
     """Ask questions of houses whose one right answer is known, of their true graphs or of maps of them."""
     scenes = _scenes(maps or [], source or [], houses, count)
-    asker = Asker(threads)
+    runner = VariantRunner(threads)
     found: dict[str, dict[str, Any]] = {}
     for i, variant in enumerate(chosen_variants(variants)):
-        replies = [[asker.ask(variant, scene, asked) for asked in scene.questions] for scene in scenes]
+        replies = [[runner.ask(variant, scene, asked) for asked in scene.questions] for scene in scenes]
         found[variant] = variant_scores(scenes, replies)
         if wrong and i == 0:
             _print_wrong(scenes, replies)
@@ -49,7 +56,7 @@ def evaluate_grounding(
     )
 
 
-def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> list[Scene]:
+def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> list[QuestionScene]:
     if bool(maps) == bool(houses):
         raise ConfigError("either MAP... with --source, or --houses must say of what is asked")
     if len(maps) != len(source):
@@ -62,7 +69,7 @@ def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> li
     return [house_scene(seed, count) for seed in range(int(first), int(last or first) + 1)]
 
 
-def variant_scores(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) -> dict[str, Any]:
+def variant_scores(scenes: Sequence[QuestionScene], replies: Sequence[Sequence[Reply]]) -> dict[str, Any]:
     """Scores of one variant in all and by form: of all scenes' questions together."""
     asked = [(i, question) for i, scene in enumerate(scenes) for question in scene.questions]
     boxes = {f"{i}/{node_id}": box for i, scene in enumerate(scenes) for node_id, box in scene.boxes.items()}
@@ -83,7 +90,7 @@ def variant_scores(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) 
     return scores
 
 
-def _print_wrong(scenes: Sequence[Scene], replies: Sequence[Sequence[Reply]]) -> None:
+def _print_wrong(scenes: Sequence[QuestionScene], replies: Sequence[Sequence[Reply]]) -> None:
     for scene, given in zip(scenes, replies, strict=True):
         for asked, reply in zip(scene.questions, given, strict=True):
             if reply.object_id != f"O{asked.target}":

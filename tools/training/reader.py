@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from placegraph.nodes.grounding.llm_parser import OPENING, asked, reply
+from placegraph.nodes.grounding.llm_parser import OPENING, model_input, model_output
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.language.language_model import LanguageModel, default_model_path
 from placegraph.tools.training.adapter import write_adapter
@@ -36,8 +36,8 @@ class Sentences:
         self.tokens: list[list[int]] = []
         self.targets: list[list[int]] = []
         for request in requests:
-            target = model.encode_reply(reply(request.program))
-            self.tokens.append(model.encode(asked(request.text), OPENING) + target[:-1])
+            target = model.encode_reply(model_output(request.program))
+            self.tokens.append(model.encode(model_input(request.text), OPENING) + target[:-1])
             self.targets.append(target)
 
     def logits(self, network: nn.Module) -> tuple[Tensor, Tensor]:

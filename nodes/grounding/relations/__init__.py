@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes, Layout
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.node import available, plugin
 
@@ -22,7 +22,7 @@ HOLDS = 0.5  # a relation holds from this fit on
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class RelationQuery:
     """What is asked of a relation: how all targets (n) stand to all anchors (m).
 
     seconds: for "between" the other anchor of each pair, as many as anchors. hint: what else the targets are told by,
@@ -33,13 +33,13 @@ class Case:
     targets: Boxes
     anchors: Boxes | None
     layout: Layout
-    views: Views
-    seconds: Boxes | None = None
-    hint: Boxes | None = None
+    viewpoints: ViewpointSelector
+    second_anchors: Boxes | None = None
+    reference: Boxes | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Fits:
+class PairFits:
     """values (n, m), m = 1 without anchors; the sentence of a pair; of ranks the margin below which none is greater.
 
     trust: 0..1, how much it decides; below 1 where no viewer was named.
@@ -57,11 +57,11 @@ class Relation:
     """One family: the phrases that the rules know each relation by, and the judge of all of them."""
 
     phrases: dict[str, tuple[str, ...]]
-    judge: Callable[[Case], Fits]
+    evaluate: Callable[[RelationQuery], PairFits]
 
 
 @cache
-def families() -> dict[str, Relation]:
+def relations_by_name() -> dict[str, Relation]:
     """Every relation and rank by its name in the schema, found by file name."""
     found: dict[str, Relation] = {}
     for module in available(__package__ or ""):
@@ -71,34 +71,34 @@ def families() -> dict[str, Relation]:
 
 
 @cache
-def triggers() -> dict[tuple[str, ...], str]:
+def trigger_phrases() -> dict[tuple[str, ...], str]:
     """Trigger phrases as word tuples to relation names; a phrase belongs to one relation."""
     return {
-        tuple(phrase.split()): name for name, family in sorted(families().items()) for phrase in family.phrases[name]
+        tuple(phrase.split()): name for name, family in sorted(relations_by_name().items()) for phrase in family.phrases[name]
     }
 
 
-def gaps_m(a: Boxes, b: Boxes) -> F64:
+def axis_gaps_m(a: Boxes, b: Boxes) -> F64:
     """(n, m, 3) free metres between boxes along each axis, negative where they overlap by so much."""
     return np.maximum(a.low[:, None] - b.high[None], b.low[None] - a.high[:, None])
 
 
-def apart_m(gaps: F64) -> F64:
+def distance_m(gaps: F64) -> F64:
     """(n, m) metres between the surfaces of boxes; 0 where they touch."""
     return np.asarray(np.linalg.norm(np.maximum(gaps, 0), axis=2))
 
 
-def flat_m(gaps: F64) -> F64:
+def horizontal_distance_m(gaps: F64) -> F64:
     """(n, m) the same as seen from above."""
     return np.asarray(np.linalg.norm(np.maximum(gaps[..., :2], 0), axis=2))
 
 
-def halving(values_m: F64, half_m: float) -> F64:
+def decay(values_m: F64, half_m: float) -> F64:
     """1 at 0 m, 0.5 at half_m, and so on."""
     return np.asarray(np.power(0.5, np.maximum(values_m, 0) / half_m))
 
 
-def share_over(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = False) -> F64:
+def footprint_overlap(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = False) -> F64:
     """(n, m) share of the target's footprint (smaller: of the smaller one's) that lies over or under the anchor's."""
     low = np.maximum(targets.low[:, None, :2], anchors.low[None, :, :2])
     high = np.minimum(targets.high[:, None, :2], anchors.high[None, :, :2])
@@ -109,7 +109,7 @@ def share_over(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = Fal
     return np.asarray(np.minimum(common / area, 1.0) * (gaps[..., :2].max(axis=2) <= 0))
 
 
-def order(values: F64) -> I64:
+def rank_positions(values: F64) -> I64:
     """(n,) the place of each value, 1: the greatest; equal ones in their order."""
     places = np.empty(len(values), np.int64)
     places[np.argsort(-values, kind="stable")] = np.arange(1, len(values) + 1)

@@ -27,10 +27,10 @@ class Counting(LanguageModel):
         super().__init__(n_ctx=n_ctx)
         self.reply, self.asked = reply, []
 
-    def complete(self, text, grammar, max_tokens, opening="", closing=""):
+    def complete(self, text, program_grammar, max_tokens, opening="", closing=""):
         assert self.fits(opening, text, max_tokens, closing)
         assert len(json.dumps(self.reply)) <= max_tokens
-        self.asked.append((opening + text + closing, grammar))
+        self.asked.append((opening + text + closing, program_grammar))
         return Reply(json.dumps(self.reply), 0.0)
 
 

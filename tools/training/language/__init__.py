@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from random import Random
 
 from placegraph.nodes.grounding.program import Thing
-from placegraph.nodes.grounding.program_syntax import write
+from placegraph.nodes.grounding.program_syntax import format_program
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.tools.training.language.sentences import Sentences
 from placegraph.tools.training.language.speaker import Speaker
@@ -41,7 +41,7 @@ def _example(seed: int, number: int, held_out: bool) -> Example:
         text, thing = Sentences(Speaker(random, held_out)).request()
         words = tokens(text)
         if len(words) <= MAX_WORDS and _is_said(thing, f" {' '.join(words)} "):
-            return Example(text[0].upper() + text[1:] if random.random() < 0.5 else text, write(_copied(thing)))
+            return Example(text[0].upper() + text[1:] if random.random() < 0.5 else text, format_program(_copied(thing)))
         attempt += 1
 
 
