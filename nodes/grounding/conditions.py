@@ -1,8 +1,8 @@
-"""The conditions of a thing applied to all that it may be: looks, groups, relations, then ranks; anchors the same way.
+"""Apply a thing's conditions to its candidates: appearance, groups, relations, then ranks. Anchors are scored the same
+way, recursively.
 
-Source: METHOD section 10, steps 3 and 4. Departs: soft all the way down: the things that an anchor may be enter with
-how well each fits, so that one wrong inner condition does not kill the right answer; what the map holds no evidence
-for decides nothing and leaves doubt.
+Not as in the paper: all candidates of an anchor take part, weighted by how well they fit, so that one misread inner
+condition does not exclude the right answer. A condition that the map holds no evidence for has no effect and is noted.
 """
 
 from __future__ import annotations
@@ -40,13 +40,16 @@ ROOM_PARTS = {
 }  # fmt: skip
 
 
+SCORED_KINDS = ("look", "group", "relation", "rank")
+
+
 def names_a_kind(noun: str) -> bool:
-    """Whether a noun names a kind of thing."""
+    """Whether a noun names a kind of thing; "something" and "thing" do not."""
     return normal_form(noun) not in GENERIC_NOUNS
 
 
 class ConditionScorer:
-    """Weighs the things of one request on one map; what must be said of it goes into the ranking's notes."""
+    """Scores the candidates of one request on one map. What could not be followed goes into the ranking's notes."""
 
     def __init__(
         self, graph: SceneGraph, names: NameMatcher, layout: Layout, viewpoints: ViewpointSelector, scope: SearchScope, ranking: Ranking
@@ -56,42 +59,45 @@ class ConditionScorer:
         self._anchors_by_thing: dict[Thing, Anchors | None] = {}
 
     def clear_anchors(self) -> None:
-        """Find all anchors anew."""
+        """Forget the anchors found so far: with another viewpoint their scores change."""
         self._anchors_by_thing.clear()
 
-    def boxes(self, fits: Sequence[NameMatch]) -> Boxes:
-        """The boxes of what fits."""
-        return self.layout.all.take([self.layout.row[fit.node.id] for fit in fits])
+    def boxes(self, matches: Sequence[NameMatch]) -> Boxes:
+        """The boxes of matched nodes."""
+        return self.layout.all.take([self.layout.row[fit.node.id] for fit in matches])
 
-    def rank_places(self, place: Thing, fits: Sequence[NameMatch]) -> list[Node]:
-        """The places called so that the conditions of a place fit best; all of them without conditions."""
+    def rank_places(self, place: Thing, matches: Sequence[NameMatch]) -> list[Node]:
+        """The matched places that fit the place's conditions best; all of them when it has none."""
         if not place.conditions:
-            return [fit.node for fit in fits]
-        scored = self.score(place, self.boxes(fits), fits, place)
-        rank_positions = sorted(range(len(fits)), key=lambda i: (-scored.scores[i], id_key(fits[i].node.id)))
+            return [fit.node for fit in matches]
+        scored = self.score(place, self.boxes(matches), matches, place)
+        rank_positions = sorted(range(len(matches)), key=lambda i: (-scored.scores[i], id_key(matches[i].node.id)))
         best = scored.scores[rank_positions[0]]
-        return [fits[i].node for i in rank_positions if scored.scores[i] >= SAME_PLACE * best]
+        return [matches[i].node for i in rank_positions if scored.scores[i] >= SAME_PLACE * best]
 
-    def score(self, thing: Thing, boxes: Boxes, fits: Sequence[NameMatch] | None, target: Thing) -> ScoredCandidates:
-        """Apply all conditions of a thing to those it may be; ranks last: "the largest near the table" is near."""
-        nodes: list[Node | None] = [fit.node for fit in fits] if fits else [None] * len(boxes)
-        scores = np.array([fit.score for fit in fits]) if fits else np.ones(len(boxes))
-        own = [one for one in thing.conditions if one.kind not in ("view", "place", "purpose")]
-        scored = ScoredCandidates(boxes, nodes, scores, narrowed=bool(own))
-        rest = [one for one in own if one.kind not in ("look", "rank")]
-        for condition in own:
+    def score(self, thing: Thing, boxes: Boxes, matches: Sequence[NameMatch] | None, target: Thing) -> ScoredCandidates:
+        """Apply all conditions of a thing to its candidates; ranks last: "the largest near the table" is near it.
+
+        fits: the candidates' nodes with the scores of their names; None when boxes are parts of rooms.
+        target: the request's target, whose noun "one" stands for.
+        """
+        nodes: list[Node | None] = [fit.node for fit in matches] if matches else [None] * len(boxes)
+        scores = np.array([fit.score for fit in matches]) if matches else np.ones(len(boxes))
+        conditions = [condition for condition in thing.conditions if condition.kind in SCORED_KINDS]
+        scored = ScoredCandidates(boxes, nodes, scores, narrowed=bool(conditions))
+        for condition in conditions:
             if condition.kind == "look":
                 self._apply_appearance(scored, condition)
         reference: Boxes | None = None
-        for condition in rest:
+        for condition in conditions:
             if condition.kind == "group":
                 self._apply_group(scored, condition)
-            else:
+            elif condition.kind == "relation":
                 reference = self._apply_relation(scored, condition, target) or reference
         if thing is self.scope.thing:
             for condition in self.scope.hints:
                 self._apply_hint(scored, condition, target, HINT_TRUST)
-        for condition in own:
+        for condition in conditions:
             if condition.kind == "rank":
                 self._apply_rank(scored, condition, target, reference)
         return scored
@@ -100,63 +106,65 @@ class ConditionScorer:
         nodes = [node for node in scored.nodes if node is not None]
         if len(nodes) < len(scored):
             return
-        seen = appearance_fits(condition.words, nodes, scored.boxes, scored.peers)
-        if not seen.known:
+        appearance = appearance_fits(condition.words, nodes, scored.boxes, scored.peers)
+        if not appearance.known:
             self.ranking.note(f"the map does not tell what is {condition.words}")
-        if seen.known or not condition.negated:  # what is not known to be so is not known not to be so
-            scored.apply_fits(seen.values, seen.sentences.__getitem__, negated=condition.negated)
+        if appearance.known or not condition.negated:  # without evidence a negation does not hold either
+            scored.apply_fits(appearance.values, appearance.sentences.__getitem__, negated=condition.negated)
 
     def _apply_group(self, scored: ScoredCandidates, condition: Condition) -> None:
-        among = scored.rankable() if condition.name == "count" else scored.peers
-        values, told = group_fits(scored.boxes, np.flatnonzero(among), condition)
-        scored.apply_fits(values, told, negated=condition.negated)
+        is_compared = scored.rankable() if condition.name == "count" else scored.peers
+        values, sentence = group_fits(scored.boxes, np.flatnonzero(is_compared), condition)
+        scored.apply_fits(values, sentence, negated=condition.negated)
 
     def _apply_relation(self, scored: ScoredCandidates, condition: Condition, target: Thing) -> Boxes | None:
-        """Apply a relation; returns the best of its anchors, which say from where a row is seen."""
+        """Apply a relation; returns its best anchors, from which ranks ("the left one") take their viewpoint."""
         anchors: list[Anchors] = []
         for inner in condition.things:
-            found = self.anchors(inner, target, len(scored))
-            if found is None:
+            candidates = self.anchors(inner, target, len(scored))
+            if candidates is None:
                 self.ranking.note(f"nothing in the map is called {inner.noun}, so {condition.name} decides nothing")
                 return None
-            anchors.append(found)
+            anchors.append(candidates)
         outcome = match_anchors(condition, scored.boxes, anchors, self.layout, self.viewpoints)
         if not outcome.known:
             self.ranking.note(f"the map holds nothing about {format_program(Thing(noun='x', conditions=(condition,)))[3:]}")
             if condition.negated:
                 return None
         scored.apply_fits(outcome.values, outcome.sentence, trust=outcome.trust, negated=condition.negated)
-        for inner, found in zip(condition.things, anchors, strict=True):
-            if found.is_unique and not condition.negated:
+        for inner, candidates in zip(condition.things, anchors, strict=True):
+            if candidates.is_unique and not condition.negated:
                 self._apply_anchor_conditions(scored, inner, target)
         return anchors[0].best() if anchors and not condition.negated else None
 
     def _apply_anchor_conditions(self, scored: ScoredCandidates, anchor: Thing, target: Thing) -> None:
-        """Let what is said of an anchor that needs it not (there is one such thing) speak for the target, a little."""
-        for condition in (one for one in anchor.conditions if one.kind == "relation" and not one.negated):
-            self._apply_hint(scored, condition, target, SPARE_TRUST)
+        """Let an unambiguous anchor's relations count a little for the target.
+
+        With one table in the map, "the cup on the table near the window" may well mean the cup near the window.
+        """
+        for condition in anchor.conditions:
+            if condition.kind == "relation" and not condition.negated:
+                self._apply_hint(scored, condition, target, SPARE_TRUST)
 
     def _apply_hint(self, scored: ScoredCandidates, condition: Condition, target: Thing, trust: float) -> None:
-        """Let a relation speak for what it fits, without force."""
-        found = [self.anchors(inner, target, len(scored)) for inner in condition.things]
-        things = [one for one in found if one is not None]
-        if things and len(things) == len(found):
-            outcome = match_anchors(condition, scored.boxes, things, self.layout, self.viewpoints)
+        """Raise the scores of what a relation fits, without demanding that it holds."""
+        anchors = self._all_anchors(condition, target, len(scored))
+        if anchors:
+            outcome = match_anchors(condition, scored.boxes, anchors, self.layout, self.viewpoints)
             values = 1 - outcome.values if condition.negated else outcome.values
             scored.apply_hint(values, outcome.sentence, trust)
 
     def _apply_rank(self, scored: ScoredCandidates, condition: Condition, target: Thing, reference: Boxes | None) -> None:
-        anchors = [self.anchors(inner, target, len(scored)) for inner in condition.things]
-        if any(one is None for one in anchors):
+        anchors = self._all_anchors(condition, target, len(scored))
+        if anchors is None:
             noun = condition.things[0].noun
             self.ranking.note(f"nothing in the map is called {noun}, so {condition.name} decides nothing")
             return
         rows = np.flatnonzero(scored.rankable())
         measure = np.full(len(scored), np.nan)
-        found = [one for one in anchors if one is not None]
         peers = scored.boxes.take(rows)
-        if found:
-            outcome = match_anchors(condition, peers, found, self.layout, self.viewpoints)
+        if anchors:
+            outcome = match_anchors(condition, peers, anchors, self.layout, self.viewpoints)
         else:
             query = RelationQuery(condition.name, peers, None, self.layout, self.viewpoints, reference=reference)
             outcome = fits_without_anchor(query)
@@ -164,45 +172,51 @@ class ConditionScorer:
         number = condition.number or 1
         if condition.name == "middle":
             measure[rows] = -np.abs(rank_positions(outcome.values) - (len(rows) + 1) / 2)
-        place = {int(row): k for k, row in enumerate(rows)}
+        peer_of_row = {int(row): k for k, row in enumerate(rows)}
         labels = scored.boxes.labels
         scored.apply_rank(
             measure,
             number,
             0.0 if condition.name == "middle" else outcome.margin,
-            lambda i: f"{outcome.sentence(place[i])}, {condition.name} first" if i in place else labels[i],
+            lambda i: f"{outcome.sentence(peer_of_row[i])}, {condition.name} first" if i in peer_of_row else labels[i],
             trust=outcome.trust,
             negated=condition.negated,
         )
 
-    def anchors(self, thing: Thing, target: Thing, targets: int) -> Anchors | None:
-        """What an anchor may be with how well each fits; None when nothing in the map is called so."""
+    def _all_anchors(self, condition: Condition, target: Thing, target_count: int) -> list[Anchors] | None:
+        """The candidates of each of a condition's anchors; None when one of them has none."""
+        anchors = [self.anchors(inner, target, target_count) for inner in condition.things]
+        found = [candidates for candidates in anchors if candidates is not None]
+        return found if len(found) == len(anchors) else None
+
+    def anchors(self, thing: Thing, target: Thing, target_count: int) -> Anchors | None:
+        """The scored candidates of an anchor; None when nothing in the map has its name."""
         if thing not in self._anchors_by_thing:
             self._anchors_by_thing[thing] = self._match_anchors(thing, target)
-        found = self._anchors_by_thing[thing]
-        return found if found is None else found.first(max(MAX_PAIRS // max(targets, 1), 1))
+        anchors = self._anchors_by_thing[thing]
+        return anchors and anchors.top(max(MAX_PAIRS // max(target_count, 1), 1))
 
     def _match_anchors(self, thing: Thing, target: Thing) -> Anchors | None:
         noun, trust = normal_form(thing.noun), 1.0
         if noun in SAME_KIND_NOUNS:
             noun = normal_form(target.noun)
         scope = self.scope
-        if any(one.kind == "place" for one in thing.conditions):
+        if any(condition.kind == "place" for condition in thing.conditions):
             scope = narrow_scope(self.graph, thing, self.names, self.rank_places)
             thing = scope.thing
-        fits: list[NameMatch] = []
+        matches: list[NameMatch] = []
         if not names_a_kind(noun):
-            fits = [NameMatch(node, 1.0, node.name) for node in scope.objects if node.name not in SURFACE_NAMES]
+            matches = [NameMatch(node, 1.0, node.name) for node in scope.objects if node.name not in SURFACE_NAMES]
         elif noun not in ROOM_PARTS or noun in ("wall", "ceiling"):
-            fits = self.names.matches(noun, scope.objects) or self.names.matches(noun, self.graph.layer("object"))
-            fits = fits or match_places(noun, scope.places, self.names)
-        shell = self.layout.room_parts(ROOM_PARTS[noun]) if noun in ROOM_PARTS else None
-        if not fits and shell is None:
-            fits, trust = self.names.nearest_matches(noun, scope.objects), FAIR_TRUST
-            if fits:
-                self.ranking.note(f"nothing is called {noun}; {fits[0].tag} is the nearest name")
-        parts = [self.score(thing, self.boxes(fits), fits, target)] if fits else []
-        if shell is not None:
-            parts.append(self.score(thing, shell, None, target))
-        count = next((one.number for one in thing.conditions_named("count")), 0)
-        return Anchors.of(parts, trust, count) if parts else None
+            matches = self.names.matches(noun, scope.objects) or self.names.matches(noun, self.graph.layer("object"))
+            matches = matches or match_places(noun, scope.places, self.names)
+        room_parts = self.layout.room_parts(ROOM_PARTS[noun]) if noun in ROOM_PARTS else None
+        if not matches and room_parts is None:
+            matches, trust = self.names.nearest_matches(noun, scope.objects), FAIR_TRUST
+            if matches:
+                self.ranking.note(f"nothing is called {noun}; {matches[0].tag} is the nearest name")
+        parts = [self.score(thing, self.boxes(matches), matches, target)] if matches else []
+        if room_parts is not None:
+            parts.append(self.score(thing, room_parts, None, target))
+        count = next((condition.number for condition in thing.conditions_named("count")), 0)
+        return Anchors.from_scores(parts, trust, count) if parts else None

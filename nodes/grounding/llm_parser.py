@@ -1,6 +1,6 @@
-"""A request read into a program by the language model with its adapter, held to the grammar of that request's programs.
+"""Parse a request into a program with the language model and its adapter, constrained by the request's grammar.
 
-Source: METHOD section 10, step 1. The adapter is trained by tools/training/reader.py on the very prompts written here.
+The adapter is trained by tools/training/reader.py on exactly the prompts that are written here.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ REPLY_TOKENS = 96  # departs: 57 are the most of 2,000 generated programs; a rep
 
 @dataclass(frozen=True)
 class ParsedRequest:
-    """What was read, and how likely the model found just this program (0 to 1)."""
+    """The program's thing, and the probability that the model gave it (0..1)."""
 
-    thing: Thing | None  # None: what the model wrote did not end
+    thing: Thing | None  # None: the model's output was cut off before its end
     confidence: float
 
 
@@ -43,26 +43,25 @@ def default_adapter_path() -> Path:
 
 
 def model_input(text: str) -> str:
-    """What stands between OPENING and the reply: the request's words as the grammar knows them."""
+    """The prompt between OPENING and the model's output: the request's words as the grammar has them."""
     return " ".join(tokens(text)) + CLOSING
 
 
 def model_output(program: str) -> str:
-    """A program's text as the model writes it."""
+    """A program's text as the model is trained to write it."""
     return f" {program}\n"
 
 
 def parse_by_model(model: LanguageModel, text: str, *, adapted: bool = True) -> ParsedRequest:
-    """The thing that a request describes.
+    """Parse a request; a program that does not end has confidence 0.
 
-    A program that does not end has no confidence at all. Raises QueryError for a request without a word or of over
-    MAX_WORDS words, and when the model has no adapter.
+    Raises QueryError for a request without a word or with more than MAX_WORDS, and when the model has no adapter.
     """
     return _read(model, text, OPENING, adapted)
 
 
 def parse_by_examples(model: LanguageModel, text: str) -> ParsedRequest:
-    """The same by the model as it comes, with examples in the prompt instead of an adapter. Raises QueryError."""
+    """Parse a request with examples in the prompt instead of an adapter. Raises QueryError."""
     return _read(model, text, prompt(__package__, "read") + "\n", adapted=False)
 
 
@@ -71,15 +70,15 @@ def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Parse
     if words > MAX_WORDS:
         raise QueryError(f"the request has {words} words and marks; at most {MAX_WORDS} are read")
     try:
-        said = model.complete(model_input(text), program_grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
+        completion = model.complete(model_input(text), program_grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
     except ReplyCut:
         return ParsedRequest(None, 0.0)
-    return ParsedRequest(resolve_same_kind(parse_program(said.text)), math.exp(said.log_probability))
+    return ParsedRequest(resolve_same_kind(parse_program(completion.text)), math.exp(completion.log_probability))
 
 
 def resolve_same_kind(thing: Thing) -> Thing:
-    """A target that is called "one" gets the noun of what is looked at: "facing the lamps, the one on the left"."""
-    faced = next(thing.conditions_named("looking"), None)
-    if thing.noun != SAME_KIND or faced is None or faced.things[0].noun == SAME_KIND:
+    """Give a target "one" the noun of what the viewer faces: "facing the lamps, the one on the left"."""
+    facing = next(thing.conditions_named("looking"), None)
+    if thing.noun != SAME_KIND or facing is None or facing.things[0].noun == SAME_KIND:
         return thing
-    return thing.model_copy(update={"noun": faced.things[0].noun})
+    return thing.model_copy(update={"noun": facing.things[0].noun})

@@ -1,6 +1,6 @@
-"""A question cut into pieces: things, relations, places, ordinals and breaks, in the order they are said.
+"""Segment a question into phrases: things, relations, places, ordinals and breaks, in their order.
 
-Longest trigger phrases win; the words between triggers and filler words are noun phrases.
+The longest trigger phrase wins; runs of words between triggers and filler words are noun phrases.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ IDIOMS = (
     "so that", "by the way", "go to", "from where i stand", "from where i am", "from here",
 )  # fmt: skip
 
-# Only these are taken off a noun: a "low table" and a "high chair" are things of their own.
+# Only these sizes are separated from a noun: "low table" and "high chair" are kinds of things.
 SIZES = {"big": "large", "large": "large", "huge": "large", "small": "small", "little": "small", "tiny": "small"}
 
 OWNS = r"\b(?:that |which )?(?:has|have|with|holds|holding|carries|carrying) (.{1,60}?) "
@@ -70,7 +70,7 @@ INVERSE_PHRASES = (
 
 @dataclass
 class Phrase:
-    """One piece: `kind` is thing, relation, floor, ordinal, and, not, or break."""
+    """One phrase: `kind` is thing, place, relation, floor, ordinal, to, and, not, or break."""
 
     kind: str
     text: str = ""
@@ -82,14 +82,14 @@ class Phrase:
 
 
 def rewrite_inverse_phrases(text: str) -> str:
-    """Turn round the conditions that are told of the anchor: "with the lamp on it" becomes "under the lamp"."""
+    """Invert conditions that are said of the anchor: "with the lamp on it" becomes "holding the lamp"."""
     for pattern, replacement in INVERSE_PHRASES:
         text = pattern.sub(replacement, text)
     return text
 
 
 def segment(text: str) -> list[Phrase]:
-    """Cut a question into pieces; filler words vanish but end a noun phrase."""
+    """Segment a question. Filler words are dropped but end a noun phrase."""
     words, phrases, i = tokens(rewrite_inverse_phrases(text)), [], 0
     triggers = trigger_phrases() | VIEWS
     longest = max(map(len, triggers))
@@ -124,7 +124,7 @@ def segment(text: str) -> list[Phrase]:
 
 
 def _single(word: str, following: str, pending: list[str], phrases: list[Phrase], flush: object) -> None:
-    """File one word that starts no phrase."""
+    """Add one word that starts no trigger phrase: to the pending noun phrase, or as a phrase of its own."""
     assert callable(flush)
     if word in BREAKS:
         flush()
@@ -152,7 +152,7 @@ def _single(word: str, following: str, pending: list[str], phrases: list[Phrase]
 
 
 def _floor(words: tuple[str, ...], i: int) -> tuple[int, str] | None:
-    """Length and text of the floor phrase that starts at word i."""
+    """The number of words and the text of the floor phrase that starts at word i; None when there is none."""
     skip = 0
     while words[i + skip : i + skip + 1] and words[i + skip] in ("on", "at", "in", "the", "from", "of") and skip < 2:
         skip += 1
@@ -167,7 +167,7 @@ def _floor(words: tuple[str, ...], i: int) -> tuple[int, str] | None:
 
 
 def _noun_phrase(words: list[str]) -> list[Phrase]:
-    """A run of content words as a noun phrase with its colour and size taken off."""
+    """A run of content words as a noun phrase, with its colour and size separated."""
     noun = [word for word in words if word not in COLORS and word not in SIZES]
     color = next((COLORS[word] for word in words if word in COLORS), "")
     size = next((SIZES[word] for word in words if word in SIZES), "")

@@ -1,8 +1,8 @@
-"""The typed program that a request is read into: a thing to find and the conditions on it, nested.
+"""The typed program that a request is parsed into: a thing to find and its conditions, nested.
 
-One schema for all that people say of an object (target, attributes, anchors with conditions of their own, relations,
-negation, ordinals, superlatives, groups, viewpoints, room, floor). Source: METHOD section 10, step 1; the conventions
-of `CONDITIONS` come from reading 400 requests of people (Nr3D). Departs: the paper has targets and anchors only.
+One schema for everything people say of an object: attributes, anchors with conditions of their own, relations,
+negation, ordinals, superlatives, groups, viewpoints, room and floor. The conventions of `CONDITIONS` come from reading
+400 requests of people (Nr3D). Not as in the paper, which has targets and anchors only.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Kind = Literal["look", "group", "relation", "rank", "view", "place", "purpose"]
 
 @dataclass(frozen=True)
 class ConditionForm:
-    """What a condition of one name holds: fewest and most things, whether words or a number, and what it means."""
+    """What a condition of one name takes: how many things (minimum, maximum), words, a number; and its meaning."""
 
     kind: Kind
     things: tuple[int, int]
@@ -82,12 +82,12 @@ CONDITIONS: dict[str, ConditionForm] = {
 RANKS = tuple(name for name, form in CONDITIONS.items() if form.kind == "rank")
 
 
-class _Part(BaseModel):
+class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
 
-class Condition(_Part):
-    """One thing that is said of a thing. `number`: 2 for "second from the left", 3 for "one of the three"; 0 unsaid."""
+class Condition(_Model):
+    """One condition on a thing. `number`: 2 in "second from the left", 3 in "one of the three"; 0 when not given."""
 
     name: str
     things: tuple[Thing, ...] = ()
@@ -110,31 +110,31 @@ class Condition(_Part):
 
     @property
     def kind(self) -> Kind:
-        """What sort of condition it is."""
+        """The kind of condition, by which it is scored."""
         return CONDITIONS[self.name].kind
 
 
-class Thing(_Part):
-    """A noun as said ("" or ANYTHING: whatever fits; SAME_KIND: of the target's kind) and what is said of it."""
+class Thing(_Model):
+    """A noun as said and its conditions. "" or ANYTHING: any kind of thing; SAME_KIND: the target's kind."""
 
     noun: str = ""
     conditions: tuple[Condition, ...] = ()
 
     def conditions_named(self, name: str) -> Iterator[Condition]:
-        """The conditions of one name, in order."""
+        """The conditions with this name, in order."""
         return (condition for condition in self.conditions if condition.name == name)
 
 
-class Program(_Part):
-    """A request: the thing to find. Views, room, floor and purpose are conditions of the target."""
+class Program(_Model):
+    """A request: the thing to find. Viewpoint, room, floor and purpose are conditions of the target."""
 
     target: Thing
 
 
 def normalized(thing: Thing) -> Thing:
-    """The same request in one form: nouns singular, conditions in order of their text, ranks numbered from 1.
+    """The program in normal form: nouns singular, conditions sorted, ranks numbered from 1.
 
-    Two readings of a request are the same when their normal forms are equal.
+    Two programs mean the same when their normal forms are equal.
     """
     conditions = []
     for condition in thing.conditions:

@@ -1,7 +1,7 @@
-"""Question to program by rules: the pieces of the question put together, without a language model.
+"""Parse a question into a program by rules, without a language model.
 
-Source: METHOD section 10, step 1. Departs: a 135 M model parses one request in five, so the order of the pieces
-(the target precedes its relation, the anchor follows) decides, and of several targets the last one said is meant.
+The order of the phrases decides: the target precedes its relation, the anchor follows it. Of several possible targets
+the last one is meant.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PURPOSE_STARTS = (
 
 @dataclass(frozen=True)
 class _Clause:
-    """One relation as it is said; `of` 0: of the target, i: of the anchor of clause i."""
+    """One relation as said. `of`: 0 when it belongs to the target, i when it belongs to the anchor of clause i."""
 
     relation: str
     anchors: tuple[Phrase, ...] = ()
@@ -41,13 +41,13 @@ class _ProgramDraft:
     target: Phrase | None = None
     clauses: list[_Clause] = field(default_factory=list)
     room: str = ""
-    room_with: list[Phrase] = field(default_factory=list)  # what tells the room: "the bedroom with the desk"
+    room_with: list[Phrase] = field(default_factory=list)  # "desk" in "the bedroom with the desk"
     outside: bool = False
     floor: str = ""
 
 
 def check_text(text: str) -> None:
-    """Raise QueryError for what is no question: empty, too long, or without an English word."""
+    """Raise QueryError for a text that is empty, too long, or has no word in Latin letters."""
     if not text.strip():
         raise QueryError("the question is empty")
     if len(text) > MAX_CHARS:
@@ -57,25 +57,25 @@ def check_text(text: str) -> None:
 
 
 def parse_by_rules(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> Program:
-    """Put the pieces of a question together.
+    """Parse a question.
 
-    is_place: whether a phrase names a room or location; is_known: whether something in the map is called so.
+    is_place: whether a phrase names a room or location; is_known: whether it names anything in the map.
     Raises QueryError when the text is no question or names nothing to look for.
     """
     check_text(text)
     phrases = [part for phrase in segment(text) for part in _split_place(phrase, is_place, is_known)]
-    leads = _without_places(phrases, is_place)
+    candidates = _without_places(phrases, is_place)
     purpose = _purpose(text)
-    options = tuple(dict.fromkeys(phrase.text for phrase in leads if phrase.text))
+    options = tuple(dict.fromkeys(phrase.text for phrase in candidates if phrase.text))
     known = tuple(option for option in options if is_known(option))
     if purpose and not known:
         program = _assemble(phrases, None, is_place)
-        places = tuple(one for one in program.target.conditions if one.kind == "place")
+        places = tuple(condition for condition in program.target.conditions if condition.kind == "place")
         use = Condition(name="for", words=purpose)
         return Program(target=Thing(noun=ANYTHING, conditions=(use, *places)))
     options = known or options
-    by_noun = {option: next(phrase for phrase in leads if phrase.text == option) for option in options}
-    chosen = by_noun[options[-1]] if options else (leads[0] if leads else None)
+    by_noun = {option: next(phrase for phrase in candidates if phrase.text == option) for option in options}
+    chosen = by_noun[options[-1]] if options else (candidates[0] if candidates else None)
     program = _assemble(phrases, chosen, is_place)
     if chosen is None and not program.target.conditions:
         raise QueryError("the question names nothing to look for")
@@ -83,16 +83,16 @@ def parse_by_rules(text: str, is_place: Callable[[str], bool], is_known: Callabl
 
 
 def _without_places(phrases: list[Phrase], is_place: Callable[[str], bool]) -> list[Phrase]:
-    """The things among which the target is; a place beside other things is where to look, not what to look for."""
-    leads = _target_candidates(phrases)
-    colored = [phrase for phrase in leads if not phrase.text and phrase.color]
-    named = [phrase for phrase in leads if phrase.text]
+    """The phrases that may be the target. A place among other things is where to look, not what to look for."""
+    candidates = _target_candidates(phrases)
+    colored = [phrase for phrase in candidates if not phrase.text and phrase.color]
+    named = [phrase for phrase in candidates if phrase.text]
     if colored and len(named) == 1:  # "the mug on the table, the blue one"
         named[0].color = named[0].color or colored[0].color
-    others = [phrase for phrase in leads if not is_place(phrase.text) and phrase not in colored]
-    if not others or len(others) == len(leads):
-        return leads
-    for phrase in leads:
+    others = [phrase for phrase in candidates if not is_place(phrase.text) and phrase not in colored]
+    if not others or len(others) == len(candidates):
+        return candidates
+    for phrase in candidates:
         if phrase.text and is_place(phrase.text):
             phrase.kind = "place"
     return others
@@ -104,7 +104,7 @@ def _purpose(text: str) -> str:
 
 
 def _split_place(phrase: Phrase, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> list[Phrase]:
-    """Take a place name off the front of a noun phrase: "kitchen table" is a table in the kitchen."""
+    """Split a leading place name off a noun phrase: "kitchen table" is a table in the kitchen."""
     words = phrase.text.split()
     if phrase.kind != "thing" or len(words) < 2 or is_place(phrase.text):
         return [phrase]
@@ -123,22 +123,22 @@ def _anchor_counts(phrase: Phrase) -> tuple[int, int]:
 
 
 def _target_candidates(phrases: list[Phrase]) -> list[Phrase]:
-    """The things that are not the anchor of a relation: those among which the target is."""
-    leads, awaited, later = [], 0, False
+    """The things that are not the anchor of a relation."""
+    candidates, anchors_due, is_deferred = [], 0, False
     for i, phrase in enumerate(phrases):
         if phrase.kind == "relation":
-            later = _anchor_counts(phrase) == (0, 1) and not _anchor_follows(phrases, i)
-            awaited = 0 if later else _anchor_counts(phrase)[1]
-        elif phrase.kind == "break" and awaited != 2:
-            awaited = 0
-        elif phrase.kind == "thing" and awaited:
-            awaited -= 1
+            is_deferred = _anchor_counts(phrase) == (0, 1) and not _anchor_follows(phrases, i)
+            anchors_due = 0 if is_deferred else _anchor_counts(phrase)[1]
+        elif phrase.kind == "break" and anchors_due != 2:
+            anchors_due = 0
+        elif phrase.kind == "thing" and anchors_due:
+            anchors_due -= 1
         elif phrase.kind == "thing":
-            leads.append(phrase)
-            # "the closest cup to the red chair": the anchor stands behind the noun and "to"
-            awaited = int(later and phrases[i + 1 : i + 2] != [] and phrases[i + 1].kind == "to")
-            later = False
-    return leads
+            candidates.append(phrase)
+            # "the closest cup to the red chair": the anchor follows the noun and "to"
+            anchors_due = int(is_deferred and phrases[i + 1 : i + 2] != [] and phrases[i + 1].kind == "to")
+            is_deferred = False
+    return candidates
 
 
 def _anchor_follows(phrases: list[Phrase], i: int) -> bool:
@@ -149,7 +149,7 @@ def _anchor_follows(phrases: list[Phrase], i: int) -> bool:
 
 
 def _assemble(phrases: list[Phrase], target: Phrase | None, is_place: Callable[[str], bool]) -> Program:
-    """One program from the pieces, given which thing is the target."""
+    """The program of the phrases, given which phrase is the target."""
     draft = _ProgramDraft(target=target)
     ordinal, negated, joined = 1, False, True
     i = 0
@@ -174,8 +174,9 @@ def _assemble(phrases: list[Phrase], target: Phrase | None, is_place: Callable[[
     thing = _thing(target, draft.clauses, 0, 1)
     places = []
     if draft.room:
-        told = tuple(Condition(name="with", things=(_thing(one, [], 0, 1),)) for one in draft.room_with)
-        places.append(Condition(name="room", things=(Thing(noun=draft.room, conditions=told),), negated=draft.outside))
+        details = tuple(Condition(name="with", things=(_thing(phrase, [], 0, 1),)) for phrase in draft.room_with)
+        room = Thing(noun=draft.room, conditions=details)
+        places.append(Condition(name="room", things=(room,), negated=draft.outside))
     if draft.floor:
         places.append(Condition(name="floor", words=draft.floor))
     thing = thing.model_copy(update={"conditions": (*thing.conditions, *places)})
@@ -183,8 +184,8 @@ def _assemble(phrases: list[Phrase], target: Phrase | None, is_place: Callable[[
 
 
 def _thing(phrase: Phrase | None, clauses: list[_Clause], index: int, depth: int) -> Thing:
-    """A piece with its looks and the clauses said of it: those of the target (index 0) or of a clause's anchor."""
-    looks = [] if phrase is None else [Condition(name="is", words=word) for word in (phrase.size, phrase.color) if word]
+    """The thing of a phrase, with the clauses that belong to it: the target's (index 0) or those of a clause's anchor."""
+    appearance = [] if phrase is None else [Condition(name="is", words=word) for word in (phrase.size, phrase.color) if word]
     relations = []
     for i, clause in enumerate(clauses[:MAX_CLAUSES], 1):
         if clause.of != index or (clause.anchors and depth == MAX_DEPTH):
@@ -196,31 +197,31 @@ def _thing(phrase: Phrase | None, clauses: list[_Clause], index: int, depth: int
         number = clause.ordinal if counts == "must" or (counts == "may" and clause.ordinal > 1) else 0
         relations.append(Condition(name=clause.relation, things=things, number=number, negated=clause.negated))
     noun = phrase.text if phrase is not None and phrase.text else ANYTHING
-    return Thing(noun=noun, conditions=(*looks, *relations))
+    return Thing(noun=noun, conditions=(*appearance, *relations))
 
 
 def _add_clause(
-    draft: _ProgramDraft, phrases: list[Phrase], i: int, is_place: Callable[[str], bool], said: tuple[int, bool, bool]
+    draft: _ProgramDraft, phrases: list[Phrase], i: int, is_place: Callable[[str], bool], modifiers: tuple[int, bool, bool]
 ) -> int:
-    """Add the relation before piece i with the anchors that follow it; returns the index after them."""
-    ordinal, negated, joined = said
+    """Add the relation before phrase i with the anchors that follow it; returns the index after them."""
+    ordinal, negated, joined = modifiers
     relation = phrases[i - 1]
-    least, most = _anchor_counts(relation)
+    min_anchors, max_anchors = _anchor_counts(relation)
     at_target = i < len(phrases) and phrases[i] is draft.target
-    if (least, most) == (0, 1) and at_target:
-        anchors, after = [], i  # "the closest chair to the window": the anchor stands behind the target and "to"
+    if (min_anchors, max_anchors) == (0, 1) and at_target:
+        anchors, after = [], i  # "the closest chair to the window": the anchor follows the target and "to"
         if i + 2 < len(phrases) and phrases[i + 1].kind == "to" and phrases[i + 2].kind == "thing":
             anchors = [phrases[i + 2]]
             del phrases[i + 1 : i + 3]
     else:
-        anchors, after = _anchors(draft, phrases, i, most)
+        anchors, after = _anchors(draft, phrases, i, max_anchors)
     if len(anchors) == 1 and relation.text in ("in", "near") and anchors[0].text in WHOLE_MAP:
         return after
     if len(anchors) == 1 and relation.text in ("in", "on", "near") and is_place(anchors[0].text):
         draft.room, draft.outside = draft.room or anchors[0].text, negated
         return after
-    if len(anchors) < least and relation.text not in ON_SPOT:
-        return after  # a preposition that leads nowhere: "something to sit on", "over there"
+    if len(anchors) < min_anchors and relation.text not in ON_SPOT:
+        return after  # a preposition that candidates nowhere: "something to sit on", "over there"
     # without "and" or a comma, a relation belongs to the noun before it: the last anchor
     if relation.text == "with" and i >= 2 and phrases[i - 2].kind in ("place", "thing") and draft.room and not joined:
         before = phrases[i - 2]
@@ -230,22 +231,22 @@ def _add_clause(
     if CONDITIONS[relation.text].kind == "view":
         joined = True
     of = 0 if joined or not draft.clauses or not draft.clauses[-1].anchors else len(draft.clauses)
-    if ordinal == 1 and most == 0 and not joined:
+    if ordinal == 1 and max_anchors == 0 and not joined:
         of = 0
     draft.clauses.append(_Clause(relation.text, tuple(anchors), of, ordinal, negated))
     return after
 
 
-def _anchors(draft: _ProgramDraft, phrases: list[Phrase], i: int, most: int) -> tuple[list[Phrase], int]:
-    """The things that follow a relation directly, at most so many, and the index after them."""
-    found: list[Phrase] = []
-    while i < len(phrases) and len(found) < most:
+def _anchors(draft: _ProgramDraft, phrases: list[Phrase], i: int, max_count: int) -> tuple[list[Phrase], int]:
+    """The things that follow a relation directly, at most max_count, and the index after them."""
+    anchors: list[Phrase] = []
+    while i < len(phrases) and len(anchors) < max_count:
         phrase = phrases[i]
         if phrase.kind == "thing" and phrase is not draft.target:
-            found.append(phrase)
+            anchors.append(phrase)
         elif phrase.kind == "place":
             draft.room = draft.room or phrase.text
-        elif not (phrase.kind == "to" or (phrase.kind == "and" and found)):
+        elif not (phrase.kind == "to" or (phrase.kind == "and" and anchors)):
             break
         i += 1
-    return found, i
+    return anchors, i

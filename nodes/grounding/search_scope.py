@@ -1,6 +1,6 @@
-"""Narrow the hierarchy by the place words of a request: floors, then rooms and locations, then objects.
+"""Narrow the search by the place words of a request: floors, then rooms and locations, then objects.
 
-Source: paper, "Selecting Related Objects". Departs: in code, by names and ids that exist, instead of a call a layer.
+Source: paper, "Selecting Related Objects". Not as in the paper: code matches names, without a model call per layer.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 PLACE_LIKENESS = 0.7  # departs: the embeddings put bedroom and living room at 0.5, which are not the same place
-# What a room of a kind holds, for maps that have no rooms or none of that name; the first ones tell most.
+# What rooms of a kind typically hold, the most typical first; used when the map has no room of that name.
 TYPICAL_OBJECTS: dict[str, tuple[str, ...]] = {
     "bathroom": ("toilet", "bathtub", "shower", "urinal", "bathroom vanity"),
     "kitchen": ("stove", "refrigerator", "kitchen counter", "kitchen cabinet", "dishwasher"),
@@ -37,9 +37,10 @@ RankPlaces = Callable[[Thing, Sequence[NameMatch]], list[Node]]
 
 @dataclass
 class SearchScope:
-    """Where to look: the objects and places left, what was done in words, and whether the words could be followed.
+    """Where to search: the objects and places left, notes on what was narrowed, and whether all words were followed.
 
-    thing: the target without its place words; what they leave for geometry ("in the closet") is among its conditions.
+    thing: the target without its place conditions; those that geometry must judge ("in the closet") stay among its
+    conditions. hints: conditions that raise scores without having to hold.
     """
 
     objects: list[Node]
@@ -47,19 +48,20 @@ class SearchScope:
     thing: Thing = field(default_factory=Thing)
     notes: list[str] = field(default_factory=list)
     sure: bool = True
-    hints: list[Condition] = field(default_factory=list)  # what speaks for the target without force
+    hints: list[Condition] = field(default_factory=list)
 
 
 def narrow_scope(graph: SceneGraph, target: Thing, names: NameMatcher, rank_places: RankPlaces) -> SearchScope:
-    """Objects under the floors and rooms that a target is said to be in. A place that is not there narrows nothing.
+    """The objects below the floors and rooms that the target is said to be in. An unknown place narrows nothing.
 
-    rank_places: the places of those called so that fit the conditions of a place best ("the bedroom with the desk").
+    rank_places: chooses, of the places with a matching name, those that fit the place's conditions best ("the bedroom
+    with the desk").
     """
     scope = SearchScope(graph.layer("object"), [*graph.layer("floor"), *graph.layer("room"), *graph.layer("location")])
     kept: list[Condition] = []
     for condition in target.conditions_named("floor"):  # first: the largest bedroom upstairs is not that of the house
         _by_floor(graph, scope, condition)
-    for condition in (one for one in target.conditions if one.name != "floor"):
+    for condition in (other for other in target.conditions if other.name != "floor"):
         if condition.name == "room" or (condition.name == "in" and _names_place(graph, condition.things[0], names)):
             kept += _by_room(graph, scope, condition, names, rank_places)
         else:
@@ -84,17 +86,17 @@ def _by_floor(graph: SceneGraph, scope: SearchScope, condition: Condition) -> No
 def _by_room(
     graph: SceneGraph, scope: SearchScope, condition: Condition, names: NameMatcher, rank_places: RankPlaces
 ) -> list[Condition]:
-    """Narrow by one place; returns what is left of it for geometry to judge."""
+    """Narrow by one place condition; returns the conditions that are left for geometry to judge."""
     place = condition.things[0]
     if place.noun in WHOLE_MAP and not place.conditions:
         return []  # in the house, in the room
     floors = [inner for inner in place.conditions if inner.name == "floor"]
     for inner in floors:
         _by_floor(graph, scope, inner)
-    place = place.model_copy(update={"conditions": tuple(one for one in place.conditions if one not in floors)})
-    fits = match_places(place.noun, [node for node in scope.places if node.layer != "floor"], names)
-    if fits:
-        places = rank_places(place, fits)
+    place = place.model_copy(update={"conditions": tuple(inner for inner in place.conditions if inner not in floors)})
+    matches = match_places(place.noun, [node for node in scope.places if node.layer != "floor"], names)
+    if matches:
+        places = rank_places(place, matches)
         listed = ", ".join(f"{node.name} {node.id}" for node in places)
         scope.notes.append(f"looked {'outside' if condition.negated else 'in'} {format_program(place)}: {listed}")
         _keep_below(graph, scope, places, outside=condition.negated)
@@ -112,8 +114,8 @@ def _by_room(
 
 
 def _is_thing(noun: str, graph: SceneGraph, names: NameMatcher) -> bool:
-    """Whether an object is called so by its words; likeness alone makes a toilet of a bathroom."""
-    return any(fit.score >= HEAD for fit in names.best_matches(noun, graph.layer("object")))
+    """Whether an object has this name by its words; by embedding similarity alone a bathroom would be a toilet."""
+    return any(match.score >= HEAD for match in names.best_matches(noun, graph.layer("object")))
 
 
 def _typical_objects(noun: str, names: NameMatcher) -> tuple[str, ...]:
@@ -121,7 +123,7 @@ def _typical_objects(noun: str, names: NameMatcher) -> tuple[str, ...]:
 
 
 def _names_place(graph: SceneGraph, thing: Thing, names: NameMatcher) -> bool:
-    """Whether "in (X)" speaks of a room: a place is called so and no object, or it is a word for a kind of room."""
+    """Whether X in "in (X)" is a place: the name of a place and of no object, or a kind of room."""
     if thing.noun in ("", "room") or _is_thing(thing.noun, graph, names):
         return False
     places = [*graph.layer("room"), *graph.layer("location")]
@@ -139,22 +141,22 @@ def _keep_below(graph: SceneGraph, scope: SearchScope, tops: Sequence[Node], *, 
 
 
 def match_places(name: str, places: Sequence[Node], names: NameMatcher) -> list[NameMatch]:
-    """Rooms and locations with that name: where it is the strongest one, else where it is among the likely ones."""
-    fits = [fit for fit in names.best_matches(name, places) if names.similarity(name, fit.tag) >= PLACE_LIKENESS]
-    strongest = [fit for fit in fits if fit.node.tags and fit.tag == fit.node.tags[0].name]
-    return strongest or fits
+    """Rooms and locations with that name: those whose strongest tag it is, else those that have it among their tags."""
+    matches = [m for m in names.best_matches(name, places) if names.similarity(name, m.tag) >= PLACE_LIKENESS]
+    strongest = [match for match in matches if match.node.tags and match.tag == match.node.tags[0].name]
+    return strongest or matches
 
 
 def match_floors(graph: SceneGraph, words: str) -> list[Node]:
-    """Floors by words: "upstairs" is all but the lowest, "second floor" the second from below, or by tag or id."""
+    """Floors by words: "upstairs" is all but the lowest, "second floor" the second from below; or by tag or id."""
     floors = sorted(graph.layer("floor"), key=lambda floor: (float(floor.box[0, 2]), floor.id))
     wanted = normal_form(words)
     tagged = [floor for floor in floors if wanted in {normal_form(tag.name) for tag in floor.tags}]
     tagged = tagged or [floor for floor in floors if floor.id.lower() == wanted]
     if tagged or not floors:
         return tagged
-    said = [word for word in wanted.split() if word not in ("on", "in", "the", "of", "at", "floor", "level", "house")]
-    first = said[0] if said else ""
+    content_words = [word for word in wanted.split() if word not in ("on", "in", "the", "of", "at", "floor", "level", "house")]
+    first = content_words[0] if content_words else ""
     if first in ("upstairs", "upstair", "upper", "above"):
         return floors[1:]
     if first in ("downstairs", "downstair", "lower", "below"):

@@ -1,7 +1,8 @@
-"""From where left, right, front and behind are meant: a view that the request names, the asker's, or the room's.
+"""Choose the viewpoint from which left, right, in front of and behind are judged.
 
-Source: METHOD section 9 (viewpoint c, f = (a - c) / |a - c|, l = z x f). Departs: who faces a thing stands square
-before it, so that the line of sight is one of its axes; and a thing with a front of its own is seen from there.
+In the order of preference: what the request names ("facing the window"), the asker's own position, the front of the
+anchor, the centre of its room. With viewpoint c and anchor a the forward direction is f = (a - c) / |a - c| and left is
+z x f. Not as in the paper: who faces a thing stands squarely before it, so f is one of the thing's axes.
 """
 
 from __future__ import annotations
@@ -29,19 +30,22 @@ HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """One viewer: place (2,) and line of sight (2,) or None: to what is looked at. Metres, world frame."""
+    """A position `eye` (2,) in metres and a forward unit vector (2,), both in the building's frame.
+
+    forward: None when the viewer turns to whatever is judged. trust: 0..1, lower when nobody named a viewpoint.
+    """
 
     source: str  # "asker", "room centre", "one who faces window O4"
     eye: F64
     forward: F64 | None = None
     trust: float = 1.0
-    z_m: float = 0.0  # where it stands
-    others: tuple[Viewpoint, ...] = ()  # of several doors: from each room its own is meant
+    z_m: float = 0.0  # height of the floor at the position
+    others: tuple[Viewpoint, ...] = ()  # one per door when several match; each room uses its own
 
 
 @dataclass(frozen=True, eq=False)
 class LinesOfSight:
-    """Lines of sight to m things: forward (m, 2) unit, eye (m, 2), whose, and how much they can be relied on (m,)."""
+    """Lines of sight to m things: forward (m, 2) unit vectors, eye (m, 2) m, sources in words, trust (m,) 0..1."""
 
     forward: F64
     eye: F64
@@ -55,12 +59,12 @@ class LinesOfSight:
 
 
 class ViewpointSelector:
-    """The view of a request on one map, in the order of preference: said, the asker's, the thing's front, the room."""
+    """Chooses the viewpoints of one request on one map."""
 
     def __init__(self, layout: Layout, asker_world: F64, heading_rad: float = np.nan) -> None:
-        """asker_world: (3,) metres, NaN when not given; heading_rad about z from +x, NaN when not given."""
+        """asker_world: (3,) metres, building frame, NaN when not given; heading_rad: about z from +x, NaN likewise."""
         self.layout = layout
-        self.requested: Viewpoint | None = None  # what the request says, once it is known
+        self.requested: Viewpoint | None = None  # set by the program executor
         self.asker: Viewpoint | None = None
         if np.isfinite(asker_world).all():
             heading = np.array([np.cos(heading_rad), np.sin(heading_rad)]) if np.isfinite(heading_rad) else None
@@ -68,11 +72,11 @@ class ViewpointSelector:
 
     @property
     def explicit(self) -> Viewpoint | None:
-        """The view that the request or the asker gives."""
+        """The viewpoint given by the request, else by the asker."""
         return self.requested or self.asker
 
     def lines_of_sight(self, anchors: Boxes) -> LinesOfSight:
-        """How each of the anchors is seen."""
+        """The line of sight to each anchor."""
         middle = self.layout.room_center(anchors.room)
         forward, eye = anchors.center[:, :2] - middle, middle
         sources, trust = ["room centre"] * len(anchors), np.full(len(anchors), MIDDLE_TRUST)
@@ -117,10 +121,7 @@ class ViewpointSelector:
         return Viewpoint("room centre", eye, forward if forward.any() else np.array([0.0, 1.0]), MIDDLE_TRUST)
 
     def facing_direction(self, things: Boxes, j: int) -> F64:
-        """(2,) the line of sight of one who stands before a thing in its room: square to it where it has a broad side.
-
-        Zero for what is in the very middle of the room.
-        """
+        """(2,) forward direction of one who stands in the room squarely before thing j; 0 at the room's very centre."""
         center, room = things.center[j, :2], things.room[j]
         way = center - self.layout.room_center(np.array([room]))[0]
         length = float(np.linalg.norm(way))
@@ -143,7 +144,7 @@ class ViewpointSelector:
         return np.asarray(directions[int(np.argmax(score))])
 
     def in_front_of(self, things: Boxes) -> Viewpoint:
-        """The view of one who looks at the first of some things, square on."""
+        """The viewpoint of one who faces the first of some things."""
         front = things.front[0]
         forward = -front / np.linalg.norm(front) if np.isfinite(front).all() else self.facing_direction(things, 0)
         center = things.center[0, :2]
@@ -152,7 +153,7 @@ class ViewpointSelector:
         return Viewpoint(f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None)
 
     def in_front_of_most(self, things: Boxes) -> Viewpoint:
-        """The view of one who looks at several things: towards the wall that most of them are on ("the windows")."""
+        """The viewpoint of one who faces several things ("the windows"): towards the wall that most of them are on."""
         row = self._in_front_of_row(things)
         if row is not None:
             return row
@@ -161,7 +162,7 @@ class ViewpointSelector:
         return ways[int(np.argmax((sights @ sights.T > SAME_WAY).sum(axis=1)))]
 
     def _in_front_of_row(self, things: Boxes) -> Viewpoint | None:
-        """The view of one who has a row of things of one room before him, across it; None where they are none."""
+        """The viewpoint before a row of things in one room, looking across the row; None when they form no row."""
         if len(things) < 2 or len(set(things.room.tolist())) > 1:
             return None
         centers = things.center[:, :2]
@@ -177,19 +178,19 @@ class ViewpointSelector:
         return Viewpoint(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
 
     def with_back_to(self, things: Boxes) -> Viewpoint:
-        """The view of one who has the first of some things behind."""
+        """The viewpoint of one who turns the back to the first of some things."""
         forward = -self.facing_direction(things, 0)
         return Viewpoint(f"{things.labels[0]} in the back", things.center[0, :2], forward if forward.any() else None)
 
     def at(self, things: Boxes) -> Viewpoint:
-        """The view of one who stands at a thing and looks to what is asked for; of several, at that of the room."""
+        """The viewpoint of one who stands at a thing and turns to what is judged; of several, at the room's own."""
         viewpoints = [Viewpoint(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))]
         return Viewpoint(viewpoints[0].source, viewpoints[0].eye, others=tuple(viewpoints))
 
     def _nearest_to_room(self, viewpoint: Viewpoint, room: int) -> Viewpoint:
-        """Of the places that one may stand at the one of a room; of a view that is not from a place itself.
+        """Of a viewpoint with alternatives (several doors) the one at this room; any other viewpoint unchanged.
 
-        Where none of them is at the room (not every doorway has a door) the asker's view, or a doubtful one.
+        When none of them is at the room (not every doorway has a door): the asker's, else the nearest, less trusted.
         """
         if not viewpoint.others:
             return viewpoint

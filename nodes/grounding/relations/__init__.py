@@ -1,8 +1,8 @@
-"""Spatial relations, computed when a question needs them: one family per module, each exporting RELATION.
+"""Spatial relations, computed when a question needs them: one group of relations per module, exported as RELATION.
 
-A family judges all pairs of targets and anchors at once by their boxes. A relation's fit is 0..1 and holds from 0.5 on;
-nothing is forced: the evidence sentence of a pair says the numbers. A rank gives a measure instead, greatest first.
-Source: METHOD section 9; paper, "Selecting Related Objects" (semantic and metric edges between targets and anchors).
+A module evaluates all pairs of targets and anchors at once from their boxes. A relation's fit is 0..1 and holds from 0.5
+on. A rank ("closest", "leftmost") gives a measure instead, greatest first. Each pair has a sentence with its numbers.
+Source: paper, "Selecting Related Objects" (semantic and metric edges between targets and anchors).
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class RelationQuery:
 
 @dataclass(frozen=True, eq=False)
 class PairFits:
-    """values (n, m), m = 1 without anchors; the sentence of a pair; of ranks the margin below which none is greater.
+    """The output of a relation: values (n, m), m = 1 without anchors, and the sentence of each pair.
 
-    trust: 0..1, how much it decides; below 1 where no viewer was named.
+    margin: rank measures closer than this are equal. trust: 0..1, how much it counts; lower without a named viewpoint.
     """
 
     values: F64
@@ -54,7 +54,7 @@ class PairFits:
 
 @dataclass(frozen=True)
 class Relation:
-    """One family: the phrases that the rules know each relation by, and the judge of all of them."""
+    """The relations of one module: the phrases by which the rule parser knows each, and the function for all."""
 
     phrases: dict[str, tuple[str, ...]]
     evaluate: Callable[[RelationQuery], PairFits]
@@ -62,44 +62,44 @@ class Relation:
 
 @cache
 def relations_by_name() -> dict[str, Relation]:
-    """Every relation and rank by its name in the schema, found by file name."""
-    found: dict[str, Relation] = {}
+    """The relation module of each relation and rank name in `CONDITIONS`."""
+    relations: dict[str, Relation] = {}
     for module in available(__package__ or ""):
         family: Relation = plugin(__package__ or "", module, "RELATION", "relation")
-        found.update(dict.fromkeys(family.phrases, family))
-    return found
+        relations.update(dict.fromkeys(family.phrases, family))
+    return relations
 
 
 @cache
 def trigger_phrases() -> dict[tuple[str, ...], str]:
-    """Trigger phrases as word tuples to relation names; a phrase belongs to one relation."""
+    """Relation names by trigger phrase (a tuple of words); a phrase belongs to one relation."""
     return {
         tuple(phrase.split()): name for name, family in sorted(relations_by_name().items()) for phrase in family.phrases[name]
     }
 
 
 def axis_gaps_m(a: Boxes, b: Boxes) -> F64:
-    """(n, m, 3) free metres between boxes along each axis, negative where they overlap by so much."""
+    """(n, m, 3) gap in metres between boxes along each axis; negative where they overlap."""
     return np.maximum(a.low[:, None] - b.high[None], b.low[None] - a.high[:, None])
 
 
 def distance_m(gaps: F64) -> F64:
-    """(n, m) metres between the surfaces of boxes; 0 where they touch."""
+    """(n, m) metres between the surfaces of boxes; 0 when they touch. gaps: of `axis_gaps_m`."""
     return np.asarray(np.linalg.norm(np.maximum(gaps, 0), axis=2))
 
 
 def horizontal_distance_m(gaps: F64) -> F64:
-    """(n, m) the same as seen from above."""
+    """(n, m) horizontal metres between the boxes' footprints."""
     return np.asarray(np.linalg.norm(np.maximum(gaps[..., :2], 0), axis=2))
 
 
 def decay(values_m: F64, half_m: float) -> F64:
-    """1 at 0 m, 0.5 at half_m, and so on."""
+    """Exponential decay: 1 at 0 m, 0.5 at half_m."""
     return np.asarray(np.power(0.5, np.maximum(values_m, 0) / half_m))
 
 
 def footprint_overlap(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = False) -> F64:
-    """(n, m) share of the target's footprint (smaller: of the smaller one's) that lies over or under the anchor's."""
+    """(n, m) share of the target's footprint (smaller: of the smaller footprint) that overlaps the anchor's."""
     low = np.maximum(targets.low[:, None, :2], anchors.low[None, :, :2])
     high = np.minimum(targets.high[:, None, :2], anchors.high[None, :, :2])
     common = np.prod(np.clip(high - low, 0, None) + 0.01 * (high >= low), axis=2)
@@ -110,7 +110,7 @@ def footprint_overlap(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: boo
 
 
 def rank_positions(values: F64) -> I64:
-    """(n,) the place of each value, 1: the greatest; equal ones in their order."""
+    """(n,) the rank of each value, 1 for the greatest; equal values keep their order."""
     places = np.empty(len(values), np.int64)
     places[np.argsort(-values, kind="stable")] = np.arange(1, len(values) + 1)
     return places

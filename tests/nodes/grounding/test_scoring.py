@@ -28,7 +28,7 @@ def test_nothing_is_weighed(scored):
     one = scored()
     one.apply_fits(np.ones(0), words)
     rank(one, [])
-    assert (len(one), one.best().tolist(), one.rankable().tolist()) == (0, [], [])
+    assert (len(one), one.relative_scores().tolist(), one.rankable().tolist()) == (0, [], [])
 
 
 def test_names_as_good_as_the_best_are_peers(scored):
