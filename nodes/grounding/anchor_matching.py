@@ -46,7 +46,9 @@ class Anchors:
         boxes = concatenate([scored.boxes for scored in scored_parts])
         weights = np.concatenate([scored.relative_scores() for scored in scored_parts])
         order = np.argsort(-weights, kind="stable")
-        return cls(boxes.take(order), weights[order], trust, count, len(scored_parts) == 1 and scored_parts[0].is_unique)
+        return cls(
+            boxes.take(order), weights[order], trust, count, len(scored_parts) == 1 and scored_parts[0].is_unique
+        )
 
     def top(self, max_count: int) -> Anchors:
         """The best candidates, at most max_count."""
@@ -75,7 +77,9 @@ class TargetFits:
     known: bool
 
 
-def match_anchors(condition: Condition, targets: Boxes, anchors: Sequence[Anchors], layout: Layout, viewpoints: ViewpointSelector) -> TargetFits:
+def match_anchors(
+    condition: Condition, targets: Boxes, anchors: Sequence[Anchors], layout: Layout, viewpoints: ViewpointSelector
+) -> TargetFits:
     """Evaluate a condition for n targets, each with its best anchor. A target is never its own anchor."""
     name = condition.name
     evaluate = relations_by_name()[name].evaluate

@@ -102,12 +102,16 @@ def _is_tagged(node: Node, word: str) -> bool:
 
 
 def _colors(nodes: Sequence[Node], color: str, shade: float, content_words: Sequence[str]) -> tuple[F64, bool]:
-    tagged = np.array([any(_is_tagged(node, word) for word in content_words if _color_stem(word) in COLORS) for node in nodes], bool)
+    tagged = np.array(
+        [any(_is_tagged(node, word) for word in content_words if _color_stem(word) in COLORS) for node in nodes], bool
+    )
     has_color = np.array([len(node.color) == 3 for node in nodes], bool)
     fits = np.full(len(nodes), UNKNOWN_FIT)
     if has_color.any():
         lab = _lab([node.color for node in nodes if len(node.color) == 3])
-        fits[has_color] = _color_fits(lab, color, shade) if color else np.clip(0.5 + shade * (lab[:, 0] - 50) / 60, 0, 1)
+        fits[has_color] = (
+            _color_fits(lab, color, shade) if color else np.clip(0.5 + shade * (lab[:, 0] - 50) / 60, 0, 1)
+        )
     # scaled so that a fit of MIN_COLOR_FIT becomes 0.5, from which on any condition holds
     fits = np.where(has_color & (fits < MIN_COLOR_FIT), fits * 0.5 / MIN_COLOR_FIT, fits)
     if tagged.any():

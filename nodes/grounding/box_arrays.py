@@ -102,7 +102,7 @@ class Layout:
         return np.asarray((self.room_low[room, :2] + self.room_high[room, :2]) / 2)
 
     def room_parts(self, kind: str) -> Boxes:
-        """The parts of all rooms, or of the building when there are none: floor, ceiling, wall, corner, center, room."""
+        """Parts of all rooms, or of the building when there are none: floor, ceiling, wall, corner, center or room."""
         low, high = (self.room_low[:-1], self.room_high[:-1]) if self.rooms else (self.room_low, self.room_high)
         rows = np.arange(len(low)) if self.rooms else np.array([-1])
         names = [room.id for room in self.rooms] or ["B0"]

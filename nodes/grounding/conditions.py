@@ -52,7 +52,13 @@ class ConditionScorer:
     """Scores the candidates of one request on one map. What could not be followed goes into the ranking's notes."""
 
     def __init__(
-        self, graph: SceneGraph, names: NameMatcher, layout: Layout, viewpoints: ViewpointSelector, scope: SearchScope, ranking: Ranking
+        self,
+        graph: SceneGraph,
+        names: NameMatcher,
+        layout: Layout,
+        viewpoints: ViewpointSelector,
+        scope: SearchScope,
+        ranking: Ranking,
     ) -> None:
         self.graph, self.names, self.layout, self.viewpoints = graph, names, layout, viewpoints
         self.scope, self.ranking = scope, ranking
@@ -128,7 +134,9 @@ class ConditionScorer:
             anchors.append(candidates)
         outcome = match_anchors(condition, scored.boxes, anchors, self.layout, self.viewpoints)
         if not outcome.known:
-            self.ranking.note(f"the map holds nothing about {format_program(Thing(noun='x', conditions=(condition,)))[3:]}")
+            self.ranking.note(
+                f"the map holds nothing about {format_program(Thing(noun='x', conditions=(condition,)))[3:]}"
+            )
             if condition.negated:
                 return None
         scored.apply_fits(outcome.values, outcome.sentence, trust=outcome.trust, negated=condition.negated)
@@ -154,7 +162,9 @@ class ConditionScorer:
             values = 1 - outcome.values if condition.negated else outcome.values
             scored.apply_hint(values, outcome.sentence, trust)
 
-    def _apply_rank(self, scored: ScoredCandidates, condition: Condition, target: Thing, reference: Boxes | None) -> None:
+    def _apply_rank(
+        self, scored: ScoredCandidates, condition: Condition, target: Thing, reference: Boxes | None
+    ) -> None:
         anchors = self._all_anchors(condition, target, len(scored))
         if anchors is None:
             noun = condition.things[0].noun

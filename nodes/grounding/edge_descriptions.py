@@ -47,5 +47,7 @@ def _edge(executor: ProgramExecutor, target: Node, anchor: Node, gap_m: float) -
 def _fit(executor: ProgramExecutor, relation: str, target: Node, anchor: Node) -> float:
     layout = executor.layout
     target_box, anchor_box = (layout.all.take([layout.row[node.id]]) for node in (target, anchor))
-    fits = relations_by_name()[relation].evaluate(RelationQuery(relation, target_box, anchor_box, layout, executor.viewpoints))
+    fits = relations_by_name()[relation].evaluate(
+        RelationQuery(relation, target_box, anchor_box, layout, executor.viewpoints)
+    )
     return float(fits.values[0, 0])

@@ -70,7 +70,9 @@ def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Parse
     if words > MAX_WORDS:
         raise QueryError(f"the request has {words} words and marks; at most {MAX_WORDS} are read")
     try:
-        completion = model.complete(model_input(text), program_grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted)
+        completion = model.complete(
+            model_input(text), program_grammar(text), REPLY_TOKENS, opening=opening, adapted=adapted
+        )
     except ReplyCut:
         return ParsedRequest(None, 0.0)
     return ParsedRequest(resolve_same_kind(parse_program(completion.text)), math.exp(completion.log_probability))

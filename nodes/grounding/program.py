@@ -35,7 +35,9 @@ class ConditionForm:
 
 
 CONDITIONS: dict[str, ConditionForm] = {
-    "is": ConditionForm("look", (0, 0), "colour, size, material, shape or state, as said: red, big, wooden, round, open", True),
+    "is": ConditionForm(
+        "look", (0, 0), "colour, size, material, shape or state, as said: red, big, wooden, round, open", True
+    ),
     "count": ConditionForm("group", (0, 0), "is one of so many; of an anchor: there are so many", number="must"),
     "alone": ConditionForm("group", (0, 0), "by itself, away from its like"),
     "near": ConditionForm("relation", (1, 1), "next to, beside, by, close to, at, around it"),
@@ -58,7 +60,9 @@ CONDITIONS: dict[str, ConditionForm] = {
     "corner": ConditionForm("relation", (0, 1), "in a corner of the room, or of the thing"),
     "center": ConditionForm("relation", (0, 1), "in the middle of the room, or of the thing"),
     "closest": ConditionForm("rank", (0, 1), "closest, nearest, closer; without a thing: to the viewer", number="may"),
-    "farthest": ConditionForm("rank", (0, 1), "farthest, far from, away from; without a thing: from the viewer", number="may"),
+    "farthest": ConditionForm(
+        "rank", (0, 1), "farthest, far from, away from; without a thing: from the viewer", number="may"
+    ),
     "leftmost": ConditionForm("rank", (0, 0), "the left one, on the left, first from the left", number="may"),
     "rightmost": ConditionForm("rank", (0, 0), "the right one, on the right, second from the right: 2", number="may"),
     "frontmost": ConditionForm("rank", (0, 0), "the front one", number="may"),

@@ -60,7 +60,9 @@ class ProgramExecutor:
         self.graph, self.names = graph, names
         self.asker_world = asker_world
         self.layout = layout or layout_of(graph)
-        self.viewpoints = ViewpointSelector(self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw)
+        self.viewpoints = ViewpointSelector(
+            self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw
+        )
 
     def viewpoint(self, node: Node) -> ReportedViewpoint:
         """From where a node is seen: what the request names, else the asker, else the centre of the node's room."""
@@ -87,7 +89,8 @@ class ProgramExecutor:
         self._choose_viewpoint(target, conditions)
         matches = self._match_targets(target.noun, scope, ranking)
         if matches:
-            self._fill_ranking(ranking, target, conditions.score(target, conditions.boxes(matches), matches, target), matches)
+            scored = conditions.score(target, conditions.boxes(matches), matches, target)
+            self._fill_ranking(ranking, target, scored, matches)
         return ranking
 
     def _nearest_to_asker(self, things: Boxes) -> Boxes:
@@ -116,8 +119,8 @@ class ProgramExecutor:
         ranking.sure &= best.holds
         if names_a_kind(target.noun):
             return
-        match_anchors = any(one.kind == "relation" and not one.negated for one in target.conditions)
-        if not best.holds and match_anchors and target.noun != SAME_KIND:
+        has_relation = any(c.kind == "relation" and not c.negated for c in target.conditions)
+        if not best.holds and has_relation and target.noun != SAME_KIND:
             # "what is under the bed?": without a name, only what really is there is an answer
             ranking.notes += best.evidence
             ranking.candidates.clear()
@@ -159,7 +162,5 @@ class ProgramExecutor:
             if anchors is None:
                 conditions.ranking.note(f"nothing in the map is called {thing.noun}, so nobody looks from there")
                 continue
-            self.viewpoints.requested = choices[condition.name](
-                self._nearest_to_asker(anchors.best(min_weight=FACED))
-            )
+            self.viewpoints.requested = choices[condition.name](self._nearest_to_asker(anchors.best(min_weight=FACED)))
             conditions.clear_anchors()  # they were scored from another viewpoint

@@ -2,9 +2,9 @@
 
     pillow; is blue; on (bed; leftmost); not near (lamp); closest 2 (window); floor (upstairs)
 
-A thing is a noun and its conditions, separated by `;`; the things of one condition are separated by `,`. Nouns and words
-are copied from the request, so the grammar is made anew for each request. Not JSON, which takes three times the tokens,
-10 ms each.
+A thing is a noun and its conditions, separated by `;`; the things of one condition are separated by `,`. Nouns and
+words are copied from the request, so the grammar is made anew for each request. Not JSON, which takes three times the
+tokens, 10 ms each.
 """
 
 from __future__ import annotations
@@ -95,7 +95,11 @@ class _Parser:
         number, words, things = 0, "", []
         if form.words and name == "is":
             words = self.words("how it looks")
-        if form.number != "never" and self.lexemes[self.position : self.position + 1] and self.lexemes[self.position].isdigit():
+        if (
+            form.number != "never"
+            and self.lexemes[self.position : self.position + 1]
+            and self.lexemes[self.position].isdigit()
+        ):
             number = int(self.lexemes[self.position])
             self.position += 1
         if self.accept("("):
@@ -133,7 +137,7 @@ def _condition(condition: Condition) -> str:
 
 
 def program_grammar(text: str) -> str:
-    """GBNF grammar of all programs of a request: " ", a thing, a newline. Raises QueryError for a text without words."""
+    """GBNF grammar of all programs of a request: " ", a thing, a newline. Raises QueryError for a wordless text."""
     words = tokens(text)
     spans = [f's{i} ::= "{word}"' + _onward(words, i) for i, word in enumerate(words) if word[0].isalnum()]
     if not spans:

@@ -184,8 +184,10 @@ def _assemble(phrases: list[Phrase], target: Phrase | None, is_place: Callable[[
 
 
 def _thing(phrase: Phrase | None, clauses: list[_Clause], index: int, depth: int) -> Thing:
-    """The thing of a phrase, with the clauses that belong to it: the target's (index 0) or those of a clause's anchor."""
-    appearance = [] if phrase is None else [Condition(name="is", words=word) for word in (phrase.size, phrase.color) if word]
+    """The thing of a phrase with its clauses: those of the target (index 0) or those of a clause's anchor."""
+    appearance = (
+        [] if phrase is None else [Condition(name="is", words=word) for word in (phrase.size, phrase.color) if word]
+    )
     relations = []
     for i, clause in enumerate(clauses[:MAX_CLAUSES], 1):
         if clause.of != index or (clause.anchors and depth == MAX_DEPTH):
@@ -201,7 +203,11 @@ def _thing(phrase: Phrase | None, clauses: list[_Clause], index: int, depth: int
 
 
 def _add_clause(
-    draft: _ProgramDraft, phrases: list[Phrase], i: int, is_place: Callable[[str], bool], modifiers: tuple[int, bool, bool]
+    draft: _ProgramDraft,
+    phrases: list[Phrase],
+    i: int,
+    is_place: Callable[[str], bool],
+    modifiers: tuple[int, bool, bool],
 ) -> int:
     """Add the relation before phrase i with the anchors that follow it; returns the index after them."""
     ordinal, negated, joined = modifiers
@@ -222,7 +228,7 @@ def _add_clause(
         return after
     if len(anchors) < min_anchors and relation.text not in ON_SPOT:
         return after  # a preposition that candidates nowhere: "something to sit on", "over there"
-    # without "and" or a comma, a relation belongs to the noun before it: the last anchor
+    # without "and" or a comma, a relation belongs to the noun just before it, which is the last anchor
     if relation.text == "with" and i >= 2 and phrases[i - 2].kind in ("place", "thing") and draft.room and not joined:
         before = phrases[i - 2]
         if before.kind == "place" or is_place(before.text):

@@ -1,7 +1,7 @@
 """Scores of a thing's candidates while its conditions are applied one after the other, with the sentences that say why.
 
-Each condition multiplies the scores by its fits, raised to the power of its trust. Not as in the paper: a candidate that
-fails a condition is not dropped; it stays listed with a low score.
+Each condition multiplies the scores by its fits, raised to the power of its trust. Not as in the paper: a candidate
+that fails a condition is not dropped; it stays listed with a low score.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class ScoredCandidates:
     """
 
     def __init__(self, boxes: Boxes, nodes: Sequence[Node | None], names: F64, *, narrowed: bool) -> None:
-        """Scores by name alone: names (n,) is how well the noun names each candidate, 0..1; narrowed: the request says more than the noun."""
+        """`names` (n,) is how well each is named, 0..1; narrowed: the request says more than the noun."""
         self.boxes, self.nodes = boxes, nodes
         self.scores = names.astype(float)
         self.sentences: list[Sentence] = []
@@ -100,7 +100,11 @@ class ScoredCandidates:
         short = f"; there are only {count}, not {number}" if count < number else ""
 
         def rank_sentence(i: int) -> str:
-            return f"{sentence(i)}, number {position_of_row[i]} of {count}{short}" if i in position_of_row else f"{sentence(i)}, set aside"
+            return (
+                f"{sentence(i)}, number {position_of_row[i]} of {count}{short}"
+                if i in position_of_row
+                else f"{sentence(i)}, set aside"
+            )
 
         self.apply_fits(values, rank_sentence, trust=trust, negated=negated)
 

@@ -58,15 +58,15 @@ def narrow_scope(graph: SceneGraph, target: Thing, names: NameMatcher, rank_plac
     with the desk").
     """
     scope = SearchScope(graph.layer("object"), [*graph.layer("floor"), *graph.layer("room"), *graph.layer("location")])
-    kept: list[Condition] = []
+    remaining: list[Condition] = []
     for condition in target.conditions_named("floor"):  # first: the largest bedroom upstairs is not that of the house
         _by_floor(graph, scope, condition)
     for condition in (other for other in target.conditions if other.name != "floor"):
         if condition.name == "room" or (condition.name == "in" and _names_place(graph, condition.things[0], names)):
-            kept += _by_room(graph, scope, condition, names, rank_places)
+            remaining += _by_room(graph, scope, condition, names, rank_places)
         else:
-            kept.append(condition)
-    scope.thing = target.model_copy(update={"conditions": tuple(kept)})
+            remaining.append(condition)
+    scope.thing = target.model_copy(update={"conditions": tuple(remaining)})
     return scope
 
 
@@ -119,7 +119,9 @@ def _is_thing(noun: str, graph: SceneGraph, names: NameMatcher) -> bool:
 
 
 def _typical_objects(noun: str, names: NameMatcher) -> tuple[str, ...]:
-    return next((things for kind, things in TYPICAL_OBJECTS.items() if names.similarity(noun, kind) >= PLACE_LIKENESS), ())
+    return next(
+        (things for kind, things in TYPICAL_OBJECTS.items() if names.similarity(noun, kind) >= PLACE_LIKENESS), ()
+    )
 
 
 def _names_place(graph: SceneGraph, thing: Thing, names: NameMatcher) -> bool:
@@ -131,10 +133,10 @@ def _names_place(graph: SceneGraph, thing: Thing, names: NameMatcher) -> bool:
 
 
 def _keep_below(graph: SceneGraph, scope: SearchScope, tops: Sequence[Node], *, outside: bool = False) -> None:
-    wanted = {top.id for top in tops}
+    floor_words = {top.id for top in tops}
 
     def is_kept(node: Node) -> bool:
-        return outside != any(step.id in wanted for step in graph.path(node.id))
+        return outside != any(step.id in floor_words for step in graph.path(node.id))
 
     scope.objects = [node for node in scope.objects if is_kept(node)]
     scope.places = [node for node in scope.places if is_kept(node)]
@@ -150,12 +152,14 @@ def match_places(name: str, places: Sequence[Node], names: NameMatcher) -> list[
 def match_floors(graph: SceneGraph, words: str) -> list[Node]:
     """Floors by words: "upstairs" is all but the lowest, "second floor" the second from below; or by tag or id."""
     floors = sorted(graph.layer("floor"), key=lambda floor: (float(floor.box[0, 2]), floor.id))
-    wanted = normal_form(words)
-    tagged = [floor for floor in floors if wanted in {normal_form(tag.name) for tag in floor.tags}]
-    tagged = tagged or [floor for floor in floors if floor.id.lower() == wanted]
+    floor_words = normal_form(words)
+    tagged = [floor for floor in floors if floor_words in {normal_form(tag.name) for tag in floor.tags}]
+    tagged = tagged or [floor for floor in floors if floor.id.lower() == floor_words]
     if tagged or not floors:
         return tagged
-    content_words = [word for word in wanted.split() if word not in ("on", "in", "the", "of", "at", "floor", "level", "house")]
+    content_words = [
+        word for word in floor_words.split() if word not in ("on", "in", "the", "of", "at", "floor", "level", "house")
+    ]
     first = content_words[0] if content_words else ""
     if first in ("upstairs", "upstair", "upper", "above"):
         return floors[1:]

@@ -83,11 +83,11 @@ class ViewpointSelector:
         viewpoint = self.explicit
         if viewpoint is not None:
             viewpoints = [self._nearest_to_room(viewpoint, int(room)) for room in anchors.room]
-            eye = np.array([one.eye for one in viewpoints]).reshape(-1, 2)
+            eye = np.array([viewpoint.eye for viewpoint in viewpoints]).reshape(-1, 2)
             forward = anchors.center[:, :2] - eye
             if viewpoint is self.requested and viewpoint.forward is not None:
                 forward = np.tile(viewpoint.forward, (len(anchors), 1))
-            sources, trust = [one.source for one in viewpoints], np.array([one.trust for one in viewpoints], float)
+            sources, trust = [v.source for v in viewpoints], np.array([v.trust for v in viewpoints], float)
         else:
             for j in range(len(anchors)):
                 if np.isfinite(anchors.front[j]).all():
@@ -99,7 +99,11 @@ class ViewpointSelector:
         return LinesOfSight(_unit(forward), eye, tuple(sources), trust)
 
     def overlooking(self, targets: Boxes, reference: Boxes | None = None) -> Viewpoint:
-        """How several things are seen at once, with a line of sight; hint: what they are told by."""
+        """One viewpoint for several targets, always with a direction.
+
+        reference: the anchors of the targets' other conditions: "the left pillow on the bed" is seen from the bed's
+        foot.
+        """
         middle = targets.center[:, :2].mean(axis=0) if len(targets) else np.zeros(2)
         viewpoint = self.explicit
         rooms = targets.room.tolist()
@@ -107,7 +111,9 @@ class ViewpointSelector:
         if viewpoint is not None:
             viewpoint = self._nearest_to_room(viewpoint, room)
             forward = viewpoint.forward if viewpoint.forward is not None else _unit((middle - viewpoint.eye)[None])[0]
-            return Viewpoint(viewpoint.source, viewpoint.eye, forward if forward.any() else np.array([0.0, 1.0]), viewpoint.trust)
+            return Viewpoint(
+                viewpoint.source, viewpoint.eye, forward if forward.any() else np.array([0.0, 1.0]), viewpoint.trust
+            )
         if reference is not None and len(reference) and reference.ids[0]:
             faced = self.in_front_of(reference.take([0]))
             return Viewpoint(faced.source, faced.eye, faced.forward, HINT_TRUST)
@@ -123,8 +129,8 @@ class ViewpointSelector:
     def facing_direction(self, things: Boxes, j: int) -> F64:
         """(2,) forward direction of one who stands in the room squarely before thing j; 0 at the room's very centre."""
         center, room = things.center[j, :2], things.room[j]
-        way = center - self.layout.room_center(np.array([room]))[0]
-        length = float(np.linalg.norm(way))
+        from_room = center - self.layout.room_center(np.array([room]))[0]
+        length = float(np.linalg.norm(from_room))
         size, yaw = things.size[j, :2], float(things.yaw[j])
         axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
         directions = np.concatenate((axes, -axes))
@@ -138,8 +144,8 @@ class ViewpointSelector:
         is_long_faced = things.labels[j].rsplit(" ", 1)[0] in LONG_FACED
         broad = (long if is_long_faced else ~long) * (ratio >= (LONG_ENOUGH if is_long_faced else ELONGATED))
         if not broad.any() and (free > WALL_M).all():
-            return way / length if length > 0.05 else np.zeros(2)
-        score = directions @ (way / length) if length > 0.05 else np.zeros(4)
+            return from_room / length if length > 0.05 else np.zeros(2)
+        score = directions @ (from_room / length) if length > 0.05 else np.zeros(4)
         score = score + 1.0 * (free <= WALL_M) + 1.0 * broad
         return np.asarray(directions[int(np.argmax(score))])
 
@@ -150,16 +156,18 @@ class ViewpointSelector:
         center = things.center[0, :2]
         room = self.layout.room_center(things.room[:1])[0]
         away = max(float((center - room) @ forward), float(np.abs(forward) @ things.size[0, :2]) / 2 + 1.0)
-        return Viewpoint(f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None)
+        return Viewpoint(
+            f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None
+        )
 
     def in_front_of_most(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who faces several things ("the windows"): towards the wall that most of them are on."""
         row = self._in_front_of_row(things)
         if row is not None:
             return row
-        ways = [self.in_front_of(things.take([j])) for j in range(min(len(things), MAX_FACED))]
-        sights = np.array([np.zeros(2) if way.forward is None else way.forward for way in ways])
-        return ways[int(np.argmax((sights @ sights.T > SAME_WAY).sum(axis=1)))]
+        viewpoints = [self.in_front_of(things.take([j])) for j in range(min(len(things), MAX_FACED))]
+        directions = np.array([np.zeros(2) if v.forward is None else v.forward for v in viewpoints])
+        return viewpoints[int(np.argmax((directions @ directions.T > SAME_WAY).sum(axis=1)))]
 
     def _in_front_of_row(self, things: Boxes) -> Viewpoint | None:
         """The viewpoint before a row of things in one room, looking across the row; None when they form no row."""
@@ -184,7 +192,9 @@ class ViewpointSelector:
 
     def at(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who stands at a thing and turns to what is judged; of several, at the room's own."""
-        viewpoints = [Viewpoint(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))]
+        viewpoints = [
+            Viewpoint(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))
+        ]
         return Viewpoint(viewpoints[0].source, viewpoints[0].eye, others=tuple(viewpoints))
 
     def _nearest_to_room(self, viewpoint: Viewpoint, room: int) -> Viewpoint:
@@ -195,7 +205,7 @@ class ViewpointSelector:
         if not viewpoint.others:
             return viewpoint
         low, high = self.layout.room_low[room], self.layout.room_high[room]
-        places = np.array([[*one.eye, one.z_m] for one in viewpoint.others])
+        places = np.array([[*other.eye, other.z_m] for other in viewpoint.others])
         away = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0), axis=1)
         nearest = viewpoint.others[int(np.argmin(away))]
         if away.min() <= AT_ROOM_M:

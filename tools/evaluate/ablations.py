@@ -1,6 +1,6 @@
 """Grounding with and without its parts: questions of houses, asked of their true graphs or of maps.
 
-Source: paper, the ablations of object grounding; METHOD section 11. Each variant changes one thing of the default mode.
+Source: paper, the ablations of object grounding. Each variant changes one thing of the default mode.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from placegraph.runtime.messages import Question
 from placegraph.runtime.query.request import make_question
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.evaluate.aligned_map import read_aligned
-from placegraph.tools.evaluate.grounding import Reply, eye_in_map, read_questions
+from placegraph.tools.evaluate.grounding import GroundingResult, eye_in_map, read_questions
 from placegraph.tools.evaluate.trajectory import level_alignment, paired
 from placegraph.tools.map_folder import TRAJECTORY, find_graph, read_trajectory
 from placegraph.tools.simulator.build import build
@@ -51,9 +51,9 @@ class QuestionScene:
     boxes: Mapping[str, F64]
     true_ids: bool = False
 
-    def question(self, asked: AskedQuestion, mode: str = "program") -> Question:
+    def question(self, question: AskedQuestion, mode: str = "program") -> Question:
         """What the asker sends: the text, and where it stands in the graph's frame."""
-        return make_question(asked.text, mode=mode, pose=eye_in_map(asked, self.true_from_graph))
+        return make_question(question.text, mode=mode, pose=eye_in_map(question, self.true_from_graph))
 
 
 def house_scene(seed: int, count: int) -> QuestionScene:
@@ -66,69 +66,71 @@ def house_scene(seed: int, count: int) -> QuestionScene:
 
 def map_scene(folder: Path, source: Path) -> QuestionScene:
     """A map with the questions of its house. Raises SourceError where the house has none, SchemaError for the map."""
-    asked = read_questions(source)
-    if not asked:
+    question = read_questions(source)
+    if not question:
         raise SourceError(f"{source}: no questions in truth/questions.json")
-    given = detect(str(source))(source, {}).given_poses()
-    estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
+    given_poses = detect(str(source))(source, {}).given_poses()
+    estimated, true = paired(read_trajectory(folder / TRAJECTORY), given_poses)
     true_from_map = level_alignment(estimated, true)
-    boxes = {one.id: one.box for one in read_aligned(folder, true_from_map).objects}
-    return QuestionScene(str(folder), SceneGraph.load(find_graph(folder)), asked, true_from_map, boxes)
+    boxes = {item.id: item.box for item in read_aligned(folder, true_from_map).objects}
+    return QuestionScene(str(folder), SceneGraph.load(find_graph(folder)), question, true_from_map, boxes)
 
 
 class VariantRunner:
-    """Asks questions in all variants; a request is read by the model once."""
+    """Asks questions in all variants. The model parses each request once; its time is charged to every variant."""
 
     def __init__(self, threads: int = 1) -> None:
         self.model = LanguageModel(threads=threads, adapter_path=default_adapter_path())
         names = NameMatcher(TextEncoder().encode)
         self.reasoner = Reasoner(names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
-        self._read: dict[tuple[str, str], Program] = {}
-        self._cost: dict[tuple[str, str], float] = {}  # ms of these readings: who is given one pays for it
+        self._programs: dict[tuple[str, str], Program] = {}
+        self._parse_ms: dict[tuple[str, str], float] = {}  # ms of each parse
         self._saved_ms, self._saved_calls = 0.0, 0
-        self._flat: dict[str, SceneGraph] = {}
+        self._flat_graphs: dict[str, SceneGraph] = {}
 
-    def ask(self, variant: str, scene: QuestionScene, asked: AskedQuestion) -> Reply:
+    def ask(self, variant: str, scene: QuestionScene, question: AskedQuestion) -> GroundingResult:
         """The reply of one variant."""
         calls, began = self.model.calls, time.perf_counter()
         self._saved_ms, self._saved_calls = 0.0, 0
         try:
-            fields = VARIANTS[variant].answer(self, scene, asked)
+            fields = VARIANTS[variant].answer(self, scene, question)
         except QueryError:
             fields = {"status": "error", "object_id": None}
         ms = (time.perf_counter() - began) * 1e3 + self._saved_ms
-        return Reply(fields["status"], fields["object_id"] or "", self.model.calls - calls + self._saved_calls, ms)
+        return GroundingResult(
+            fields["status"], fields["object_id"] or "", self.model.calls - calls + self._saved_calls, ms
+        )
 
-    def by_mode(self, scene: QuestionScene, asked: AskedQuestion, mode: str) -> dict[str, Any]:
+    def by_mode(self, scene: QuestionScene, question: AskedQuestion, mode: str) -> dict[str, Any]:
         """The answer of one of the product's modes."""
-        return self.reasoner.answer(scene.graph, 0, scene.question(asked, mode))
+        return self.reasoner.answer(scene.graph, 0, scene.question(question, mode))
 
     def by_program(
-        self, scene: QuestionScene, asked: AskedQuestion, program: Program, graph: SceneGraph | None = None
+        self, scene: QuestionScene, question: AskedQuestion, program: Program, graph: SceneGraph | None = None
     ) -> dict[str, Any]:
         """The answer to a program that is given."""
-        return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(asked), program)
+        return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(question), program)
 
-    def program(self, asked: AskedQuestion, how: str = "adapter") -> Program:
-        """What the model reads: with the adapter, without, or without but with examples before the request."""
-        key = (how, asked.text)
-        if key in self._read:
-            self._saved_ms, self._saved_calls = self._cost[key], 1
+    def program(self, question: AskedQuestion, how: str = "adapter") -> Program:
+        """The model's program: how is "adapter", "plain" (no adapter) or "examples" (no adapter, examples in prompt)."""
+        key = (how, question.text)
+        if key in self._programs:
+            self._saved_ms, self._saved_calls = self._parse_ms[key], 1
         else:
             began = time.perf_counter()
             if how == "examples":
-                reading = parse_by_examples(self.model, asked.text)
+                parsed = parse_by_examples(self.model, question.text)
             else:
-                reading = parse_by_model(self.model, asked.text, adapted=how == "adapter")
-            self._read[key] = Program(target=reading.thing or Thing(noun=asked.text))
-            self._cost[key] = (time.perf_counter() - began) * 1e3
-        return self._read[key]
+                parsed = parse_by_model(self.model, question.text, adapted=how == "adapter")
+            self._programs[key] = Program(target=parsed.thing or Thing(noun=question.text))
+            self._parse_ms[key] = (time.perf_counter() - began) * 1e3
+        return self._programs[key]
 
     def flat(self, scene: QuestionScene) -> SceneGraph:
         """The scene's objects in one room without a name."""
-        if scene.name not in self._flat:
-            self._flat[scene.name] = without_hierarchy(scene.graph)
-        return self._flat[scene.name]
+        if scene.name not in self._flat_graphs:
+            self._flat_graphs[scene.name] = without_hierarchy(scene.graph)
+        return self._flat_graphs[scene.name]
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ class Variant:
 
 VARIANTS: Mapping[str, Variant] = {
     "program": Variant("the default: read by the model with its adapter", lambda a, s, q: a.by_mode(s, q, "program")),
-    "oracle": Variant("the true program in place of the reading", lambda a, s, q: a.by_program(s, q, true_program(q))),
+    "oracle": Variant("the true program in place of the parsed", lambda a, s, q: a.by_program(s, q, true_program(q))),
     "no relations": Variant(
         "only the noun, room and floor count, as in HOV-SG",
         lambda a, s, q: a.by_program(s, q, without_relations(a.program(q))),
@@ -170,21 +172,21 @@ def chosen_variants(names: str) -> list[str]:
     return chosen
 
 
-def true_program(asked: AskedQuestion) -> Program:
+def true_program(question: AskedQuestion) -> Program:
     """The program that the question was made from."""
-    return Program(target=parse_program(asked.program))
+    return Program(target=parse_program(question.program))
 
 
 def without_relations(program: Program) -> Program:
     """The noun with its room and floor alone."""
-    kept = tuple(condition for condition in program.target.conditions if condition.kind == "place")
-    return Program(target=Thing(noun=program.target.noun, conditions=kept))
+    conditions = tuple(condition for condition in program.target.conditions if condition.kind == "place")
+    return Program(target=Thing(noun=program.target.noun, conditions=conditions))
 
 
 def without_places(program: Program) -> Program:
     """The request without room and floor."""
-    kept = tuple(condition for condition in program.target.conditions if condition.kind != "place")
-    return Program(target=Thing(noun=program.target.noun, conditions=kept))
+    conditions = tuple(condition for condition in program.target.conditions if condition.kind != "place")
+    return Program(target=Thing(noun=program.target.noun, conditions=conditions))
 
 
 def without_hierarchy(graph: SceneGraph) -> SceneGraph:

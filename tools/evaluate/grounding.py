@@ -1,4 +1,4 @@
-"""Questions of a house asked of its map: how often the box of the answer is the right one."""
+"""Questions of a house question of its map: how often the box of the answer is the right one."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ IOUS = (0.1, 0.25, 0.5, 0.75)  # paper, "Metrics" of object grounding
 
 
 @dataclass(frozen=True)
-class Reply:
-    """What came back: status, the object's id ("" without one), calls of the language model, and the time in ms."""
+class GroundingResult:
+    """One answer: status, the object's id ("" without one), calls of the language model, and the time in ms."""
 
     status: str
     object_id: str
@@ -46,51 +46,53 @@ def read_questions(source: Path) -> list[AskedQuestion] | None:
         raise SourceError(f"{file}: {error}") from None
 
 
-def ask_all(folder: Path, questions: Sequence[AskedQuestion], true_from_map: F64) -> list[Reply]:
-    """The map's reply to each question; true_from_map (4, 4) moves the map onto the truth."""
-    replies = []
+def ask_all(folder: Path, questions: Sequence[AskedQuestion], true_from_map: F64) -> list[GroundingResult]:
+    """Ask a map each question; true_from_map (4, 4) moves the map onto the truth."""
+    results = []
     with Answerer() as answerer:
-        for asked in questions:
-            fields = answerer.ask(folder, make_question(asked.text, pose=eye_in_map(asked, true_from_map)))
-            replies.append(Reply(fields["status"], fields["object_id"] or "", fields["llm_calls"], fields["ms"]))
-    return replies
+        for question in questions:
+            fields = answerer.ask(folder, make_question(question.text, pose=eye_in_map(question, true_from_map)))
+            results.append(
+                GroundingResult(fields["status"], fields["object_id"] or "", fields["llm_calls"], fields["ms"])
+            )
+    return results
 
 
-def eye_in_map(asked: AskedQuestion, true_from_map: F64) -> list[float] | None:
+def eye_in_map(question: AskedQuestion, true_from_map: F64) -> list[float] | None:
     """Where the asker stands, metres, map frame; None where the answer does not depend on it."""
-    if asked.viewpoint is None:
+    if question.viewpoint is None:
         return None
-    eye: list[float] = (true_from_map[:3, :3].T @ (asked.viewpoint - true_from_map[:3, 3])).tolist()
+    eye: list[float] = (true_from_map[:3, :3].T @ (question.viewpoint - true_from_map[:3, 3])).tolist()
     return eye
 
 
 def grounding_scores(
-    questions: Sequence[AskedQuestion], replies: Sequence[Reply], boxes: dict[str, F64]
+    questions: Sequence[AskedQuestion], results: Sequence[GroundingResult], boxes: dict[str, F64]
 ) -> dict[str, Any]:
     """Scores in all and by form; `boxes` are the map objects' (2, 3) by id, in the frame of the questions."""
     ious = []
-    for question, reply in zip(questions, replies, strict=True):
-        answered = reply.status == "found" and reply.object_id in boxes
-        ious.append(box_iou(boxes[reply.object_id], question.box) if answered else 0.0)
+    for question, result in zip(questions, results, strict=True):
+        answered = result.status == "found" and result.object_id in boxes
+        ious.append(box_iou(boxes[result.object_id], question.box) if answered else 0.0)
     overlap = np.array(ious)
     forms = np.array([question.form for question in questions], object)
     return {
-        "all": _score_row(overlap, replies),
+        "all": _score_row(overlap, results),
         "forms": {
-            form: _score_row(overlap[forms == form], [r for r, f in zip(replies, forms, strict=True) if f == form])
+            form: _score_row(overlap[forms == form], [r for r, f in zip(results, forms, strict=True) if f == form])
             for form in sorted(set(forms.tolist()))
         },
     }
 
 
-def _score_row(ious: F64, replies: Sequence[Reply]) -> dict[str, Any]:
-    count = len(replies)
-    status = [reply.status for reply in replies]
+def _score_row(ious: F64, results: Sequence[GroundingResult]) -> dict[str, Any]:
+    count = len(results)
+    status = [result.status for result in results]
     return {
         "questions": count,
         **{f"acc_{iou:g}": share(int((ious > iou).sum()), count) for iou in IOUS},
         "not_in_map": status.count("not_in_map"),
         "errors": status.count("error"),
-        "ms": share(sum(reply.ms for reply in replies), count),
-        "calls": share(sum(reply.calls for reply in replies), count),
+        "ms": share(sum(result.ms for result in results), count),
+        "calls": share(sum(result.calls for result in results), count),
     }

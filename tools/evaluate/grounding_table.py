@@ -20,7 +20,7 @@ from placegraph.tools.evaluate.ablations import (
     house_scene,
     map_scene,
 )
-from placegraph.tools.evaluate.grounding import Reply, grounding_scores
+from placegraph.tools.evaluate.grounding import GroundingResult, grounding_scores
 from placegraph.tools.evaluate.report import number, plain, table
 
 HEADS = ("exact id", "Acc@.1", "Acc@.25", "Acc@.5", "Acc@.75", "not in map", "errors", "ms p50", "ms p95", "calls")
@@ -44,15 +44,17 @@ def evaluate_grounding(
     """Ask questions of houses whose one right answer is known, of their true graphs or of maps of them."""
     scenes = _scenes(maps or [], source or [], houses, count)
     runner = VariantRunner(threads)
-    found: dict[str, dict[str, Any]] = {}
+    scores: dict[str, dict[str, Any]] = {}
     for i, variant in enumerate(chosen_variants(variants)):
         replies = [[runner.ask(variant, scene, asked) for asked in scene.questions] for scene in scenes]
-        found[variant] = variant_scores(scenes, replies)
+        scores[variant] = variant_scores(scenes, replies)
         if wrong and i == 0:
             _print_wrong(scenes, replies)
-        print(f"{variant}: Acc@.25 {found[variant]['all']['acc_0.25']:.3f}", file=sys.stderr, flush=True)
+        print(f"{variant}: Acc@.25 {scores[variant]['all']['acc_0.25']:.3f}", file=sys.stderr, flush=True)
     print(
-        json.dumps(plain(found), sort_keys=True) if as_json else _text(found, forms, "exact" if houses else "acc_0.25")
+        json.dumps(plain(scores), sort_keys=True)
+        if as_json
+        else _text(scores, forms, "exact" if houses else "acc_0.25")
     )
 
 
@@ -69,12 +71,12 @@ def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> li
     return [house_scene(seed, count) for seed in range(int(first), int(last or first) + 1)]
 
 
-def variant_scores(scenes: Sequence[QuestionScene], replies: Sequence[Sequence[Reply]]) -> dict[str, Any]:
+def variant_scores(scenes: Sequence[QuestionScene], replies: Sequence[Sequence[GroundingResult]]) -> dict[str, Any]:
     """Scores of one variant in all and by form: of all scenes' questions together."""
     asked = [(i, question) for i, scene in enumerate(scenes) for question in scene.questions]
     boxes = {f"{i}/{node_id}": box for i, scene in enumerate(scenes) for node_id, box in scene.boxes.items()}
     flat = [
-        Reply(one.status, f"{i}/{one.object_id}" if one.object_id else "", one.calls, one.ms)
+        GroundingResult(one.status, f"{i}/{one.object_id}" if one.object_id else "", one.calls, one.ms)
         for i, scene in enumerate(replies)
         for one in scene
     ]
@@ -84,31 +86,31 @@ def variant_scores(scenes: Sequence[QuestionScene], replies: Sequence[Sequence[R
     ms = np.array([reply.ms for reply in flat])
     rows = [("", scores["all"]), *scores["forms"].items()]
     for form, row in rows:
-        mine = names == form if form else np.ones(len(names), bool)
-        row["exact"] = float(exact[mine].mean()) if all(scene.true_ids for scene in scenes) else float("nan")
-        row["ms_p50"], row["ms_p95"] = (float(np.percentile(ms[mine], share)) for share in (50, 95))
+        in_form = names == form if form else np.ones(len(names), bool)
+        row["exact"] = float(exact[in_form].mean()) if all(scene.true_ids for scene in scenes) else float("nan")
+        row["ms_p50"], row["ms_p95"] = (float(np.percentile(ms[in_form], share)) for share in (50, 95))
     return scores
 
 
-def _print_wrong(scenes: Sequence[QuestionScene], replies: Sequence[Sequence[Reply]]) -> None:
-    for scene, given in zip(scenes, replies, strict=True):
-        for asked, reply in zip(scene.questions, given, strict=True):
+def _print_wrong(scenes: Sequence[QuestionScene], replies: Sequence[Sequence[GroundingResult]]) -> None:
+    for scene, results in zip(scenes, replies, strict=True):
+        for asked, reply in zip(scene.questions, results, strict=True):
             if reply.object_id != f"O{asked.target}":
                 print(
                     f"{scene.name} {asked.form}: {asked.text!r} -> {reply.object_id or reply.status}, O{asked.target}"
                 )
 
 
-def _text(found: dict[str, dict[str, Any]], forms: bool, measure: str) -> str:
-    questions = next(iter(found.values()))["all"]["questions"]
-    rows = [[f"{questions} questions", *HEADS], *([name, *_cells(one["all"])] for name, one in found.items())]
+def _text(scores: dict[str, dict[str, Any]], forms: bool, measure: str) -> str:
+    questions = next(iter(scores.values()))["all"]["questions"]
+    rows = [[f"{questions} questions", *HEADS], *([name, *_cells(one["all"])] for name, one in scores.items())]
     parts = [table(rows)]
     if forms:
-        names = list(next(iter(found.values()))["forms"])
-        counts = next(iter(found.values()))["forms"]
-        heads = [f"{measure} by form", "questions", *found]
+        names = list(next(iter(scores.values()))["forms"])
+        counts = next(iter(scores.values()))["forms"]
+        heads = [f"{measure} by form", "questions", *scores]
         body = [
-            [form, str(counts[form]["questions"]), *(number(one["forms"][form][measure]) for one in found.values())]
+            [form, str(counts[form]["questions"]), *(number(one["forms"][form][measure]) for one in scores.values())]
             for form in names
         ]
         parts.append(table([heads, *body]))

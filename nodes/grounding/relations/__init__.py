@@ -1,7 +1,7 @@
 """Spatial relations, computed when a question needs them: one group of relations per module, exported as RELATION.
 
-A module evaluates all pairs of targets and anchors at once from their boxes. A relation's fit is 0..1 and holds from 0.5
-on. A rank ("closest", "leftmost") gives a measure instead, greatest first. Each pair has a sentence with its numbers.
+A module evaluates all pairs of targets and anchors at once from their boxes. A relation's fit is 0..1 and holds from
+0.5 on. A rank ("closest", "leftmost") gives a measure instead, greatest first. Each pair has a sentence with numbers.
 Source: paper, "Selecting Related Objects" (semantic and metric edges between targets and anchors).
 """
 
@@ -23,10 +23,10 @@ HOLDS = 0.5  # a relation holds from this fit on
 
 @dataclass(frozen=True, eq=False)
 class RelationQuery:
-    """What is asked of a relation: how all targets (n) stand to all anchors (m).
+    """The input of a relation: n targets and m anchors; no anchors for `corner` and ranks without a thing.
 
-    seconds: for "between" the other anchor of each pair, as many as anchors. hint: what else the targets are told by,
-    which says from where they are seen when nothing else does. Without a thing (`corner`, ranks) there are no anchors.
+    second_anchors: for "between", the other anchor of each pair. reference: anchors of the targets' other conditions,
+    which give ranks their viewpoint when nothing else does.
     """
 
     relation: str
@@ -74,7 +74,9 @@ def relations_by_name() -> dict[str, Relation]:
 def trigger_phrases() -> dict[tuple[str, ...], str]:
     """Relation names by trigger phrase (a tuple of words); a phrase belongs to one relation."""
     return {
-        tuple(phrase.split()): name for name, family in sorted(relations_by_name().items()) for phrase in family.phrases[name]
+        tuple(phrase.split()): name
+        for name, family in sorted(relations_by_name().items())
+        for phrase in family.phrases[name]
     }
 
 

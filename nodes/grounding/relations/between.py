@@ -1,7 +1,4 @@
-"""Between two anchors: the target's place along and beside the line that joins them.
-
-Source: METHOD section 9. Departs: along the middle part of the line and not far beside it.
-"""
+"""Between two anchors: the target's position along the line that joins them, and its distance beside that line."""
 
 from __future__ import annotations
 
@@ -24,9 +21,9 @@ def evaluate(query: RelationQuery) -> PairFits:
     offset = query.targets.center[:, None, :2] - a[None]
     along = np.einsum("nmk,mk->nm", offset, line) / length**2
     aside = np.abs(offset[..., 0] * line[None, :, 1] - offset[..., 1] * line[None, :, 0]) / length
-    # beside the middle of two long beds one is still between them
+    # what is beside the middle of two long beds is still between them
     normal = np.abs(np.stack((-line[:, 1], line[:, 0]), axis=1)) / length[:, None]
-    reach = [np.einsum("mk,mk->m", normal, one.size[:, :2]) / 2 for one in (first, second)]
+    reach = [np.einsum("mk,mk->m", normal, anchor.size[:, :2]) / 2 for anchor in (first, second)]
     aside = np.maximum(aside - np.minimum(*reach), 0)
     widest = np.maximum(ASIDE_SHARE * length, ASIDE_LEAST_M)
     inner = np.clip((0.5 - np.abs(along - 0.5)) * 5, 0, 1)  # a half at a tenth of the way, whole from a fifth on

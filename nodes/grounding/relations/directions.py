@@ -1,9 +1,8 @@
-"""Left, right, in front of and behind an anchor, and across from it, as seen along the line of sight to it.
+"""Left of, right of, in front of, behind and across from an anchor, as seen along the line of sight to it.
 
-Source: METHOD section 9; left and right of a thing with a front are those of one who faces its front, as in Sr3D.
-Departs: margins, so that what is straight ahead is neither left nor right; nearness counts, as people use these words.
-Where nobody says who looks, "in front of" and "behind" fall back on nearness (of 2,206 human sentences nearest fits
-best) and left and right count less.
+Left and right of a thing with a front are those of a viewer who faces its front, as in Sr3D. Margins leave what is
+straight ahead neither left nor right, and nearness counts, as people use these words. Without a named viewpoint "in
+front of" and "behind" mostly mean nearness (the best reading of 2,206 human sentences), and left and right count less.
 """
 
 from __future__ import annotations
@@ -26,15 +25,15 @@ def evaluate(query: RelationQuery) -> PairFits:
     """All pairs."""
     anchors = query.anchors
     assert anchors is not None
-    lines = query.viewpoints.lines_of_sight(anchors)
+    sights = query.viewpoints.lines_of_sight(anchors)
     offset = (query.targets.center[:, None] - anchors.center[None])[..., :2]
-    left = np.einsum("nmk,mk->nm", offset, lines.left)
-    ahead = np.einsum("nmk,mk->nm", offset, lines.forward)
+    left = np.einsum("nmk,mk->nm", offset, sights.left)
+    ahead = np.einsum("nmk,mk->nm", offset, sights.forward)
     gap = distance_m(axis_gaps_m(query.targets, anchors))
     half = anchors.size[:, :2] / 2
-    deep = np.einsum("mk,mk->m", np.abs(lines.forward), half)
-    wide = np.einsum("mk,mk->m", np.abs(lines.left), half)
-    blind = np.asarray(~lines.forward.any(axis=1))
+    deep = np.einsum("mk,mk->m", np.abs(sights.forward), half)
+    wide = np.einsum("mk,mk->m", np.abs(sights.left), half)
+    blind = np.asarray(~sights.forward.any(axis=1))
     if query.relation in ("left", "right"):
         main = left if query.relation == "left" else -left
         share = _direction_fit(main, wide, np.abs(ahead) - deep)
@@ -42,7 +41,7 @@ def evaluate(query: RelationQuery) -> PairFits:
     elif query.relation in ("front", "behind"):
         main = ahead if query.relation == "behind" else -ahead
         share = _direction_fit(main, deep, np.abs(left) - wide)
-        unsaid = lines.trust < 1
+        unsaid = sights.trust < 1
         mild = MILD + (1 - MILD) * share
         values = np.where(unsaid | blind, np.where(blind, MILD, mild), share) * decay(gap, FRONT_M)
     else:
@@ -52,24 +51,25 @@ def evaluate(query: RelationQuery) -> PairFits:
 
     def sentence(i: int, j: int) -> str:
         a, b = query.targets.labels[i], anchors.labels[j]
-        seen = f"seen from the {lines.sources[j]}"
+        seen = f"seen from the {sights.sources[j]}"
         if blind[j]:
-            return f"{b} is at the {lines.sources[j]}, from where it has no sides; {a} is {gap[i, j]:.2f} m from it"
+            return f"{b} is at the {sights.sources[j]}, from where it has no sides; {a} is {gap[i, j]:.2f} m from it"
         if query.relation in ("left", "right"):
             side = "left" if left[i, j] > 0 else "right"
             return f"{a} is {abs(left[i, j]):.2f} m to the {side} of {b}, {seen}"
         side = "farther than" if ahead[i, j] > 0 else "nearer than"
         return f"{a} is {abs(ahead[i, j]):.2f} m {side} {b} {seen} and {gap[i, j]:.2f} m from it"
 
-    trust = float(lines.trust.max()) if len(anchors) and query.relation in ("left", "right") else 1.0
+    trust = float(sights.trust.max()) if len(anchors) and query.relation in ("left", "right") else 1.0
     return PairFits(values, sentence, trust=trust)
 
 
 def _direction_fit(main: F64, half: F64, cross: F64) -> F64:
-    """Fit 0..1 of a direction: 1 from 45 degrees on, a half at 15, none on the other side.
+    """Fit 0..1 of a direction: 1 from 45 degrees off the other axis on, 0.5 at 15 degrees, 0 on the other side.
 
-    main (n, m): metres that way from the anchor's middle, half (m,) of them within it; cross (n, m): metres beyond its
-    edge to the other way: what stands before the left end of a sofa is before it, and hardly to its left.
+    main (n, m): metres from the anchor's centre in the direction, of which half (m,) lie within the anchor.
+    cross (n, m): metres beyond the anchor's edge across the direction, so that what stands before the left end of a
+    sofa is before it and hardly to its left.
     """
     beyond = np.maximum(main - half, 0) + WITHIN * np.maximum(main, 0)
     share = np.where(main > 0, beyond / np.maximum(np.hypot(beyond, np.maximum(cross, 0)), 1e-9), -1.0)

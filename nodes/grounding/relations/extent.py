@@ -1,6 +1,6 @@
-"""Largest, smallest, tallest, shortest, longest, highest, lowest among the targets.
+"""Largest, smallest, tallest, shortest, longest, highest and lowest of the targets.
 
-Source: METHOD section 9. Departs: size by the two longer sides first, as the third of flat things is mostly noise.
+Size counts the two longer sides first, because the third side of flat things is mostly measurement noise.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ HEIGHT_MARGIN_M = 0.05  # departs: as above, in metres
 
 
 def log_size(boxes: Boxes) -> F64:
-    """(N,) log of how large things look."""
+    """(N,) logarithm of how large things look."""
     sides = np.sort(np.maximum(boxes.size, 0.02), axis=1)
     return np.asarray(np.log(sides[:, 2]) + np.log(sides[:, 1]) + THIRD * np.log(sides[:, 0]))
 

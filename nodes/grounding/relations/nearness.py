@@ -1,7 +1,7 @@
-"""Near and against, closest and farthest, alone: by the distance between box surfaces.
+"""Near, against, closest and farthest, by the distance between box surfaces.
 
-Source: paper, metric edges ("object A is in 3 meters of object B"). Departs: surfaces, not centres (METHOD section 9),
-so that a chair beside a long table is beside it; of several near ones the nearest is meant most.
+Source: paper, metric edges ("object A is in 3 meters of object B"). Not as in the paper: distances between surfaces,
+not centres, so that a chair beside a long table is near it.
 """
 
 from __future__ import annotations
@@ -30,26 +30,28 @@ MIDDLES = 0.1  # departs: share of the distance of middles that tells apart what
 
 
 def in_different_rooms(targets: Boxes, anchors: Boxes) -> F64:
-    """(n, m) 1 where two things are in different rooms; a place is in none."""
+    """(n, m) 1.0 where two things are in different rooms, else 0.0; places are in no room."""
     a, b = targets.room[:, None], anchors.room[None]
     apart = (a != b) & (a >= 0) & (b >= 0) & ~targets.is_place[:, None] & ~anchors.is_place[None]
     return np.asarray(apart.astype(float))
 
 
 def _rank_by_viewer_distance(query: RelationQuery) -> PairFits:
-    """Ranks without a thing: by the distance to who looks, else to what else was said, else to the room's middle."""
+    """Ranks without an anchor: by the distance to the viewer, else to the reference, else to the room's centre."""
     sign = -1.0 if query.relation == "closest" else 1.0
     if query.viewpoints.explicit is None and query.reference is not None:
-        hinted = _rank_by_anchor_distance(RelationQuery(query.relation, query.targets, query.reference, query.layout, query.viewpoints))
-        return PairFits(hinted.values[:, :1], hinted.sentence, MARGIN_M, MIDDLE_TRUST)
+        by_reference = _rank_by_anchor_distance(
+            RelationQuery(query.relation, query.targets, query.reference, query.layout, query.viewpoints)
+        )
+        return PairFits(by_reference.values[:, :1], by_reference.sentence, MARGIN_M, MIDDLE_TRUST)
     viewpoint = query.viewpoints.overlooking(query.targets)
     center = query.targets.center[:, :2]
     low, high = query.targets.low[:, :2], query.targets.high[:, :2]
-    away = np.linalg.norm(np.maximum(np.maximum(low - viewpoint.eye, viewpoint.eye - high), 0), axis=1)
-    away = away + MIDDLES * np.linalg.norm(center - viewpoint.eye, axis=1)
+    distance = np.linalg.norm(np.maximum(np.maximum(low - viewpoint.eye, viewpoint.eye - high), 0), axis=1)
+    distance = distance + MIDDLES * np.linalg.norm(center - viewpoint.eye, axis=1)
     return PairFits(
-        sign * away[:, None],
-        lambda i, _: f"{query.targets.labels[i]} is {away[i]:.2f} m from the {viewpoint.source}",
+        sign * distance[:, None],
+        lambda i, _: f"{query.targets.labels[i]} is {distance[i]:.2f} m from the {viewpoint.source}",
         MARGIN_M,
         viewpoint.trust,
     )

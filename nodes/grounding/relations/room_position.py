@@ -1,6 +1,6 @@
-"""Where in its room, or at what part of a thing, something is: in a corner, in the middle, at the end, along a wall.
+"""Positions within a room or at a part of an anchor: in a corner, in the middle, at the end, along a wall, facing it.
 
-Source: METHOD section 9. Departs: the room's box stands for its walls, which is right for rectangular rooms only.
+The room's box stands for its walls, which is right for rectangular rooms only.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ def _corner(query: RelationQuery) -> PairFits:
     gaps_high = np.maximum(np.maximum(low[:, None] - b, b - high[:, None]), 0)
     away = np.linalg.norm(np.minimum(gaps_low, gaps_high), axis=2)
     labels = query.anchors.labels
-    return PairFits(decay(away, CORNER_M), lambda i, j: _distance_sentence(query, i, away[i, j], f"a corner of {labels[j]}"))
+    return PairFits(
+        decay(away, CORNER_M), lambda i, j: _distance_sentence(query, i, away[i, j], f"a corner of {labels[j]}")
+    )
 
 
 def _distance_sentence(query: RelationQuery, i: int, away: float, what: str) -> str:
@@ -55,11 +57,13 @@ def _center(query: RelationQuery) -> PairFits:
     aside = np.abs(center[:, None] - middle)
     share = np.linalg.norm(aside / np.maximum(half, 0.01), axis=2) / np.sqrt(2)
     away = np.linalg.norm(aside, axis=2)
-    return PairFits(decay(share, MIDDLE_SHARE), lambda i, j: _distance_sentence(query, i, away[i, j], f"the middle of {names[j]}"))
+    return PairFits(
+        decay(share, MIDDLE_SHARE), lambda i, j: _distance_sentence(query, i, away[i, j], f"the middle of {names[j]}")
+    )
 
 
 def _end(query: RelationQuery) -> PairFits:
-    """Near the middle of one of the two short sides of the anchor."""
+    """Near the middle of one of the anchor's two short sides."""
     anchors = query.anchors
     assert anchors is not None
     long = anchors.size[:, 0] >= anchors.size[:, 1]
@@ -67,16 +71,18 @@ def _end(query: RelationQuery) -> PairFits:
     ends = np.stack((anchors.center[:, :2] - reach, anchors.center[:, :2] + reach))
     low, high = query.targets.low[:, None, :2], query.targets.high[:, None, :2]
     away = np.min([np.linalg.norm(np.maximum(np.maximum(low - e, e - high), 0), axis=2) for e in ends], axis=0)
-    return PairFits(decay(away, END_M), lambda i, j: _distance_sentence(query, i, away[i, j], f"an end of {anchors.labels[j]}"))
+    return PairFits(
+        decay(away, END_M), lambda i, j: _distance_sentence(query, i, away[i, j], f"an end of {anchors.labels[j]}")
+    )
 
 
 def _wall_gaps_m(boxes: Boxes, low: F64, high: F64) -> F64:
-    """(N, 4) free metres to the walls at low x, low y, high x, high y of each one's room."""
+    """(N, 4) metres from each box to the walls of its room at low x, low y, high x and high y."""
     return np.concatenate((boxes.low[:, :2] - low[:, :2], high[:, :2] - boxes.high[:, :2]), axis=1)
 
 
 def _along_wall(query: RelationQuery) -> PairFits:
-    """How near to the wall that the anchor is nearest to, as a share of the room."""
+    """Near the wall that the anchor stands at: the distance to it as a share of the room's width."""
     anchors = query.anchors
     assert anchors is not None
     room_low, room_high = query.layout.room_low[anchors.room], query.layout.room_high[anchors.room]
@@ -93,12 +99,12 @@ def _along_wall(query: RelationQuery) -> PairFits:
 
 
 def _facing(query: RelationQuery) -> PairFits:
-    """Turned towards the anchor; of what has no known front nothing is said."""
+    """The target's front points towards the anchor; without a known front nearness decides a little."""
     anchors = query.anchors
     assert anchors is not None
-    way = (anchors.center[None] - query.targets.center[:, None])[..., :2]
-    way = way / np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-9)
-    cosine = np.einsum("nk,nmk->nm", query.targets.front, way)
+    direction = (anchors.center[None] - query.targets.center[:, None])[..., :2]
+    direction = direction / np.maximum(np.linalg.norm(direction, axis=2, keepdims=True), 1e-9)
+    cosine = np.einsum("nk,nmk->nm", query.targets.front, direction)
     known = bool(np.isfinite(query.targets.front).all(axis=1).any())
     near = decay(distance_m(axis_gaps_m(query.targets, anchors)), 4.0)
     turned = np.clip(0.5 + (cosine - FACING_COSINE), 0, 1) * (0.5 + 0.5 * near)

@@ -1,7 +1,6 @@
-"""Places in a row as seen by a viewer: leftmost, rightmost, frontmost, backmost, the middle one, the n-th.
+"""The order of things in a row as seen by a viewer: leftmost, rightmost, frontmost, backmost, the middle, the n-th.
 
-Source: METHOD section 9. Departs: who looks at several things sees them in order of bearing from where they stand, or
-along the line square to the line of sight.
+Things are ordered by their bearing from the viewer, or across the line of sight when the viewer faces a wall.
 """
 
 from __future__ import annotations
@@ -17,19 +16,19 @@ DOOR_NAMES = ("door", "doorway", "doorframe", "entrance", "door frame")
 
 
 def _lateral_order(query: RelationQuery, viewpoint: Viewpoint) -> F64:
-    """(n,) metres to the left of the line of sight."""
+    """(n,) position of each target to the left of the line of sight, m."""
     assert viewpoint.forward is not None
     offset = query.targets.center[:, :2] - viewpoint.eye
     ahead, left = offset @ viewpoint.forward, offset @ np.array([-viewpoint.forward[1], viewpoint.forward[0]])
-    # what one looks at along a fixed line is ordered along the line across it; from a place by bearing
+    # before a wall or a row the order is that across the line of sight, from a point it is that of the bearings
     if not len(left) or viewpoint.source.startswith("place before") or not (ahead > 0.3).all():
         return np.asarray(left)
     return np.asarray(np.arctan2(left, ahead) * float(np.linalg.norm(offset, axis=1).mean()))
 
 
 def _viewpoint_at_door(query: RelationQuery) -> Viewpoint | None:
-    """Who speaks of the back of a room without a viewer sees it from its door."""
-    doors = [i for i, one in enumerate(query.layout.all.labels) if one.rsplit(" ", 1)[0] in DOOR_NAMES]
+    """The view into the room from its only door: "the back of the room" without a viewpoint is meant from there."""
+    doors = [i for i, label in enumerate(query.layout.all.labels) if label.rsplit(" ", 1)[0] in DOOR_NAMES]
     rooms = set(query.targets.room.tolist())
     doors = [i for i in doors if int(query.layout.all.room[i]) in rooms]
     if len(doors) != 1 or len(rooms) != 1:
@@ -40,7 +39,7 @@ def _viewpoint_at_door(query: RelationQuery) -> Viewpoint | None:
 
 
 def evaluate(query: RelationQuery) -> PairFits:
-    """One value a target, greatest first; of `middle` and `nth` the order along the row, from the left."""
+    """One value per target, greatest first; for `middle` and `nth` the position along the row from the left."""
     targets = query.targets
     if query.relation == "nth" and bool(targets.is_place.all()):  # the second bedroom: in the order of their ids
         values = -np.arange(len(targets), dtype=float)
@@ -49,11 +48,15 @@ def evaluate(query: RelationQuery) -> PairFits:
         gap = distance_m(axis_gaps_m(targets, query.reference)).min(axis=1)
         return PairFits(-gap[:, None], lambda i, _: f"{targets.labels[i]} is {gap[i]:.2f} m from there", MARGIN_M)
     viewpoint = query.viewpoints.overlooking(targets, query.reference)
-    if query.relation == "nth" and query.viewpoints.requested is not None and query.viewpoints.requested.forward is None:
-        # the first bed as one comes in: of those who stand at a place, the nearest comes first
+    if (
+        query.relation == "nth"
+        and query.viewpoints.requested is not None
+        and query.viewpoints.requested.forward is None
+    ):
+        # "the first bed as you come in": from a place, the nearest comes first
         away = np.linalg.norm(targets.center[:, :2] - viewpoint.eye, axis=1)
-        told = f"m from the {viewpoint.source}"
-        return PairFits(-away[:, None], lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {told}", MARGIN_M)
+        words = f"m from the {viewpoint.source}"
+        return PairFits(-away[:, None], lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {words}", MARGIN_M)
     if query.relation in ("frontmost", "backmost"):
         if viewpoint.source == "room centre":
             viewpoint = _viewpoint_at_door(query) or viewpoint
@@ -75,7 +78,7 @@ def evaluate(query: RelationQuery) -> PairFits:
 
 
 def _along_row(query: RelationQuery, left: F64) -> F64:
-    """The order of a row that runs along the line of sight is that of its own direction."""
+    """The order along the row's own direction when three or more things have no explicit viewpoint."""
     if len(left) < 3 or query.viewpoints.explicit is not None:
         return left
     flat = query.targets.center - query.targets.center.mean(axis=0)

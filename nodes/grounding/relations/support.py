@@ -1,6 +1,6 @@
-"""On, under, above, in, and their inverses: holds, with. By footprints, tops and bottoms of boxes.
+"""On, under, above and in, and their inverses holds and with, from the footprints, tops and bottoms of boxes.
 
-Source: METHOD section 9. Departs: graded, for what a depth camera measures; 1 mm contact is never seen.
+Fits are graded, because a depth camera never measures exact contact.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ PART_M, BESIDE_M = 0.1, 0.75  # departs: "with" also means a part that touches, 
 
 
 def on_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
-    """(n, m): the target rests on the anchor, or hangs on it."""
+    """(n, m) fit: the target rests on the anchor or hangs on it."""
     over = footprint_overlap(targets, anchors, gaps)
     gap = targets.low[:, None, 2] - anchors.high[None, :, 2]
     height = anchors.size[None, :, 2]
     raised = (targets.low[:, None, 2] - anchors.low[None, :, 2]) / (STANDS_SHARE * height)
-    # a bottom below the top: thin things lie in the noise of both boxes, in thick ones it counts how far up it is
+    # a bottom below the anchor's top: for thin anchors this is noise, for thick ones its height within them counts
     sunk = np.maximum(np.clip(raised, 0, 1), decay(-gap, CONTACT_M))
     above_middle = targets.center[:, None, 2] > anchors.center[None, :, 2]
     rests = np.clip(over * 1.25, 0, 1) * np.where(gap > 0, decay(gap, CONTACT_M), sunk * above_middle)
@@ -56,15 +56,15 @@ def on_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
 
 
 def under_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
-    """(n, m): the target is lower than the anchor, below it or nearly so."""
+    """(n, m) fit: the target is lower than the anchor and below it or nearly below it."""
     over = footprint_overlap(targets, anchors, gaps, smaller=True)
     rise = anchors.center[None, :, 2] - targets.center[:, None, 2]
     apart = anchors.low[None, :, 2] - targets.high[:, None, 2]  # negative: they overlap in height
     lower = np.clip(0.5 + rise / (2 * MIX_M), 0, 1)
-    # without a footprint in common it must be wholly lower: what stands beside a table is not under it
+    # without overlapping footprints it must be entirely lower: what stands beside a table is not under it
     aside = 0.8 * decay(horizontal_distance_m(gaps), ASIDE_M) * np.clip(0.5 + (apart + MIX_M) / (2 * MIX_M), 0, 1)
     below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * decay(apart, RISE_M)
-    # a chair that is tucked under a desk mostly stands before it, and its back rises above the desk's middle
+    # a chair tucked under a desk is mostly before it, and its back rises above the desk's middle
     legs = np.array([_has_legs(label) for label in anchors.labels], bool)[None]
     stands = (targets.low[:, None, 2] - anchors.low[None, :, 2]) < OFF_GROUND_M
     lowered = targets.center[:, None, 2] < anchors.high[None, :, 2]
@@ -72,7 +72,7 @@ def under_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
 
 
 def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
-    """(n, m): most of the target is within the anchor; in a room when it belongs to it."""
+    """(n, m) fit: most of the target's volume is within the anchor; for a room: the target belongs to it."""
     half = targets.size / 2
     low = np.maximum((targets.center - half)[:, None], anchors.low[None] - GROWN_M)
     high = np.minimum((targets.center + half)[:, None], anchors.high[None] + GROWN_M)
@@ -82,7 +82,7 @@ def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
     raised = np.clip((targets.low[:, None, 2] - anchors.low[None, :, 2]) / (RAISED * anchors.size[None, :, 2]), 0, 1)
     share = np.where(legs, share * raised, share)
     fit = np.where(legs, fit * raised, fit)
-    rooms = np.array([bool(one) and one[0] == "R" for one in anchors.ids], bool)
+    rooms = np.array([bool(node_id) and node_id[0] == "R" for node_id in anchors.ids], bool)
     same = targets.room[:, None] == anchors.room[None]
     return np.where(rooms[None] & (anchors.room >= 0)[None], same.astype(float), np.where(share > 0.95, 1.0, fit))
 
@@ -102,7 +102,7 @@ def evaluate(query: RelationQuery) -> PairFits:
     gaps = axis_gaps_m(targets, anchors)
     name = query.relation
     if name == "on":
-        # "on" is said of a cup in a cupboard's box too: shelves, racks, counters with a wall behind
+        # a cup within the box of a shelf, rack or counter with a back wall is "on" it, too
         values = np.maximum(on_fit(targets, anchors, gaps), WITHIN_SHARE * in_fit(targets, anchors, gaps))
         values = _with_room_parts(targets, anchors, gaps, values)
     elif name == "in":
@@ -121,16 +121,16 @@ def evaluate(query: RelationQuery) -> PairFits:
 
 
 def _with_room_parts(targets: Boxes, anchors: Boxes, gaps: F64, values: F64) -> F64:
-    """The fits (n, m) of "on" and "in" with those of walls, floors and corners that no map holds as objects."""
-    shell = np.array([not one for one in anchors.ids], bool)
-    wall, floor = shell & (anchors.size[:, 2] > 1.0), shell & (anchors.size[:, 2] <= FLOOR_M)
-    spot = shell & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
-    flat = horizontal_distance_m(gaps)
+    """The fits (n, m) of "on" and "in", replaced where the anchor is a wall, floor or corner of a room."""
+    is_room_part = np.array([not node_id for node_id in anchors.ids], bool)
+    is_wall, is_floor = is_room_part & (anchors.size[:, 2] > 1.0), is_room_part & (anchors.size[:, 2] <= FLOOR_M)
+    is_spot = is_room_part & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
+    aside_m = horizontal_distance_m(gaps)
     off = targets.low[:, None, 2] - anchors.low[None, :, 2] > OFF_GROUND_M
     above = targets.low[:, None, 2] - anchors.high[None, :, 2] - FLOOR_M
-    values = np.where(wall[None], HANGS_SHARE * decay(flat, WALL_M) * off, values)
-    values = np.where(floor[None], decay(above, CONTACT_M) * (flat <= 0), values)
-    return np.where(spot[None], decay(flat, CORNER_M), values)
+    values = np.where(is_wall[None], HANGS_SHARE * decay(aside_m, WALL_M) * off, values)
+    values = np.where(is_floor[None], decay(above, CONTACT_M) * (aside_m <= 0), values)
+    return np.where(is_spot[None], decay(aside_m, CORNER_M), values)
 
 
 def _holds(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
@@ -140,23 +140,23 @@ def _holds(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
 
 def _sentence(query: RelationQuery, i: int, j: int) -> str:
     assert query.anchors is not None
-    one, other = query.targets.take([i]), query.anchors.take([j])
+    subject, support = query.targets.take([i]), query.anchors.take([j])
     name = query.relation
     if name in ("holds", "with"):
-        one, other = other, one
-    gaps = axis_gaps_m(one, other)
-    over = float(footprint_overlap(one, other, gaps, smaller=name in ("under", "above"))[0, 0])
-    a, b = one.labels[0], other.labels[0]
+        subject, support = support, subject
+    gaps = axis_gaps_m(subject, support)
+    over = float(footprint_overlap(subject, support, gaps, smaller=name in ("under", "above"))[0, 0])
+    a, b = subject.labels[0], support.labels[0]
     if name in ("under", "above"):
-        rise = float(one.center[0, 2] - other.center[0, 2])
+        rise = float(subject.center[0, 2] - support.center[0, 2])
         word = "higher" if rise > 0 else "lower"
         aside = float(horizontal_distance_m(gaps)[0, 0])
         beside = f"{over:.0%} of it {'over' if rise > 0 else 'under'} it" if over else f"{aside:.2f} m aside"
         return f"{a} is {abs(rise):.2f} m {word} than {b}, {beside}"
-    inside = float(in_fit(one, other, gaps)[0, 0])
+    inside = float(in_fit(subject, support, gaps)[0, 0])
     if name == "in" and inside >= 0.5:
         return f"{a} is within {b}"
-    gap = float(one.low[0, 2] - other.high[0, 2])
+    gap = float(subject.low[0, 2] - support.high[0, 2])
     if name == "with" and over < 0.1:
         return f"{a} is {float(distance_m(gaps)[0, 0]):.2f} m from {b}"
     level = f"{abs(gap):.2f} m {'above' if gap > 0 else 'below'}" if abs(gap) >= 0.005 else "level with"

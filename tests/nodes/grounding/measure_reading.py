@@ -48,7 +48,9 @@ def main(arguments):
     model = LanguageModel(adapter_path=adapter)
     ways = {
         "adapter": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(parse_by_model(model, text)),
-        "plain": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(parse_by_model(model, text, adapted=False)),
+        "plain": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(
+            parse_by_model(model, text, adapted=False)
+        ),
         "examples": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(parse_by_examples(model, text)),
         "rules": by_rules,
     }

@@ -58,5 +58,7 @@ def test_a_thing_is_not_its_own_anchor(house, names):
     layout = layout_of(house)
     lamps = layout.all.take([layout.row[i] for i in ("O11", "O18")])
     said = next(iter(parse_program("lamp; closest (one)").conditions))
-    outcome = match_anchors(said, lamps, [Anchors(lamps, np.ones(2))], layout, ViewpointSelector(layout, np.full(3, np.nan)))
+    outcome = match_anchors(
+        said, lamps, [Anchors(lamps, np.ones(2))], layout, ViewpointSelector(layout, np.full(3, np.nan))
+    )
     assert "from lamp O18, in another room" in outcome.sentence(0)

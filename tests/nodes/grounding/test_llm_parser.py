@@ -84,6 +84,8 @@ def test_a_model_without_an_adapter_reads_nothing():
 
 
 def test_one_is_of_the_kind_that_is_looked_at():
-    assert format_program(resolve_same_kind(parse_program("one; looking (lamps; count 2); leftmost"))).startswith("lamps; looking (lamps")
+    assert format_program(resolve_same_kind(parse_program("one; looking (lamps; count 2); leftmost"))).startswith(
+        "lamps; looking (lamps"
+    )
     for text in ("one; near (door)", "chair; looking (lamps)", "one; looking (one; is red)"):
         assert format_program(resolve_same_kind(parse_program(text))) == text

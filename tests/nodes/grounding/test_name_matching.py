@@ -91,4 +91,9 @@ def test_what_is_fairly_called_so_is_taken_where_nothing_is(names, house):
     fair = names.nearest_matches("sofas", objects)
     assert {fit.node.name for fit in fair} == {"sofa"}
     assert all(fit.score >= FAIR for fit in fair)
-    assert names.nearest_matches("zebra", objects) == names.nearest_matches("", objects) == names.nearest_matches("o3", objects) == []
+    assert (
+        names.nearest_matches("zebra", objects)
+        == names.nearest_matches("", objects)
+        == names.nearest_matches("o3", objects)
+        == []
+    )

@@ -42,7 +42,11 @@ def test_the_order_of_preference(layout):
     assert asked.lines_of_sight(tv).sources == ("asker",)
     asked.requested = asked.at(layout.all.take([1]))
     assert asked.lines_of_sight(tv).sources == ("bed O1",)
-    assert asked.lines_of_sight(tv).trust.tolist() == [1.0] > ViewpointSelector(layout, NOBODY).lines_of_sight(tv).trust.tolist()
+    assert (
+        asked.lines_of_sight(tv).trust.tolist()
+        == [1.0]
+        > ViewpointSelector(layout, NOBODY).lines_of_sight(tv).trust.tolist()
+    )
 
 
 def test_a_front_is_seen_by_who_faces_it(room_of):

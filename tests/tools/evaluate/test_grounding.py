@@ -5,7 +5,7 @@ import pytest
 
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.evaluate.grounding import Reply, ask_all, eye_in_map, grounding_scores, read_questions
+from placegraph.tools.evaluate.grounding import GroundingResult, ask_all, eye_in_map, grounding_scores, read_questions
 from placegraph.tools.simulator.questions import AskedQuestion, to_json
 
 BOX = np.array([[0.0, 0, 0], [1, 1, 1]])
@@ -16,7 +16,7 @@ def question(form, text="find the chair", viewpoint=None):
 
 
 def reply(object_id, status="found", calls=0, ms=2.0):
-    return Reply(status, object_id, calls, ms)
+    return GroundingResult(status, object_id, calls, ms)
 
 
 def moved(x):

@@ -50,7 +50,10 @@ def test_every_item_is_an_object_at_its_place() -> None:
 def test_every_question_has_a_program_of_its_own_words() -> None:
     for one in asked():
         assert format_program(parse_program(one.program)) == one.program
-        nouns = [parse_program(one.program).noun, *(inner.noun for c in parse_program(one.program).conditions for inner in c.things)]
+        nouns = [
+            parse_program(one.program).noun,
+            *(inner.noun for c in parse_program(one.program).conditions for inner in c.things),
+        ]
         assert all(noun in one.text.lower() for noun in nouns), (one.text, one.program)
 
 

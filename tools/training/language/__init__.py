@@ -41,7 +41,9 @@ def _example(seed: int, number: int, held_out: bool) -> Example:
         text, thing = Sentences(Speaker(random, held_out)).request()
         words = tokens(text)
         if len(words) <= MAX_WORDS and _is_said(thing, f" {' '.join(words)} "):
-            return Example(text[0].upper() + text[1:] if random.random() < 0.5 else text, format_program(_copied(thing)))
+            return Example(
+                text[0].upper() + text[1:] if random.random() < 0.5 else text, format_program(_copied(thing))
+            )
         attempt += 1
 
 

@@ -71,7 +71,9 @@ def test_every_relation_survives_nothing(cube):
         second_anchors = [] if relation == "between" else None
         assert evaluate(relation, [], anchors, second_anchors=second_anchors).values.size == 0, relation
         if CONDITIONS[relation].things[1]:
-            assert evaluate(relation, [cube(0, (0, 0, 0))], [], second_anchors=second_anchors).values.shape == (1, 0), relation
+            assert evaluate(relation, [cube(0, (0, 0, 0))], [], second_anchors=second_anchors).values.shape == (1, 0), (
+                relation
+            )
 
 
 def test_phrases_belong_to_one_relation():
@@ -164,7 +166,9 @@ def test_closest_is_by_surfaces_and_a_wall_between_makes_far(cube, thing_of):
     )  # fmt: skip
     above, beside = thing_of(1, "R1", "cube", (1, 1, 3.3), (0.4,) * 3), cube(2, (3, 1, 2.5))
     layout = layout_of(SceneGraph.of([*places_of([[0, 0, 0], [4, 4, 3.0]]), room, cube(0, (1, 1, 2.5)), above, beside]))
-    query = RelationQuery("closest", layout.all.take([1, 2]), layout.all.take([0]), layout, ViewpointSelector(layout, NOBODY))
+    query = RelationQuery(
+        "closest", layout.all.take([1, 2]), layout.all.take([0]), layout, ViewpointSelector(layout, NOBODY)
+    )
     assert relations_by_name()["closest"].evaluate(query).values.argmax() == 1
 
 
