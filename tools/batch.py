@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import track
 
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError, SchemaError
-from placegraph.runtime.query.reply import refusal
+from placegraph.runtime.query.reply import error_reply
 from placegraph.runtime.query.request import MAX_BYTES, make_question
 from placegraph.runtime.scene_graph.object_list import OwnId
 from placegraph.tools.answerer import Answerer
@@ -64,12 +64,12 @@ class Batch:
             question_id = _id(fields)
             reply = self._ask(fields)
         except (QueryError, SchemaError) as error:
-            reply = refusal(str(error))
+            reply = error_reply(str(error))
         except (ModelError, ConfigError):
             raise
         except Exception as error:  # a bug; the other lines are still to be answered
             logger.exception("line %d", number)
-            reply = refusal(f"{type(error).__name__}: {error}")
+            reply = error_reply(f"{type(error).__name__}: {error}")
         if reply["status"] == "error":
             reply["error"] = f"line {number}: {reply['error']}"
         return {"question_id": question_id} | {name: reply[name] for name in FIELDS}

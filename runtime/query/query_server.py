@@ -12,7 +12,7 @@ from typing import Any
 from placegraph.runtime.bus.session import Request
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
-from placegraph.runtime.query.reply import finished, refusal, to_bytes
+from placegraph.runtime.query.reply import error_reply, finished, to_bytes
 from placegraph.runtime.query.request import asked_id, parse_request
 
 MAX_WAITING = 16
@@ -52,7 +52,7 @@ class QueryServer:
             question = parse_request(request.payload, f"Q{number}")
         except QueryError as error:
             ms = (time.monotonic() - began_s) * 1e3
-            request.reply(to_bytes(refusal(str(error), asked_id(request.payload), ms=ms)))
+            request.reply(to_bytes(error_reply(str(error), asked_id(request.payload), ms=ms)))
             return
         timer = threading.Timer(self._timeout_s, self._refuse, (number, f"no answer within {self._timeout_s:g} s"))
         timer.daemon = True
@@ -64,7 +64,7 @@ class QueryServer:
             if not reason:
                 self._waiting[number] = asker
         if reason:
-            asker.reply(lambda ms: refusal(reason, question.question_id, question.text, ms))
+            asker.reply(lambda ms: error_reply(reason, question.question_id, question.text, ms))
             return
         timer.start()
         self._forward(number, question)
@@ -80,7 +80,7 @@ class QueryServer:
         with self._lock:
             asker = self._waiting.pop(number, None)
         if asker is not None:
-            asker.reply(lambda ms: refusal(reason, asker.question.question_id, asker.question.text, ms))
+            asker.reply(lambda ms: error_reply(reason, asker.question.question_id, asker.question.text, ms))
 
     def is_waiting(self, number: int) -> bool:
         """Whether the asker of a question still waits; after the time limit nobody does, and a step would be wasted."""

@@ -1,4 +1,4 @@
-"""What askers receive (README, "Asking"): every reply, also one that says why there is no answer, fits `Reply`."""
+"""The reply that an asker receives, also when there is no answer: `Reply`, sent as JSON."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ Point = Annotated[list[float], Field(min_length=3, max_length=3)]  # metres, wor
 Score = Annotated[float, Field(ge=0, le=1)]
 
 
-class _Part(BaseModel):
+class _ReplyModel(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
 
-class Step(_Part):
-    """One node of the path from the building to the object."""
+class PathStep(_ReplyModel):
+    """One node on the path from the building down to the object."""
 
     id: str
     layer: str
     name: str
 
 
-class RankedObject(_Part):
+class RankedObject(_ReplyModel):
     """One candidate with its score and the sentences that say why."""
 
     id: str
@@ -32,22 +32,22 @@ class RankedObject(_Part):
     evidence: list[str]
 
 
-class Stand(_Part):
-    """Where to stand before the object."""
+class ApproachPose(_ReplyModel):
+    """The pose to take before the object: metres and radians about z, world frame."""
 
     position: Point
     yaw_rad: float
 
 
-class View(_Part):
-    """Where left, right, front and behind were judged from."""
+class ReplyViewpoint(_ReplyModel):
+    """The point from which left, right, front and behind were judged; world frame."""
 
     source: str
     xyz: Point
     heading_rad: float | None = None
 
 
-class Reply(_Part):
+class Reply(_ReplyModel):
     """The fields of a reply, always all of them. `Reply.model_json_schema()` is its JSON Schema."""
 
     status: Literal["found", "not_in_map", "error"]
@@ -58,15 +58,15 @@ class Reply(_Part):
     name: str | None
     box: Annotated[list[Point], Field(min_length=2, max_length=2)] | None  # min and max
     center: Point | None
-    path: list[Step]
-    approach: Stand | None
+    path: list[PathStep]
+    approach: ApproachPose | None
     route: list[str]
     travel_m: Annotated[float, Field(ge=0)] | None
     evidence: list[str]
     candidates: list[RankedObject]
     parse: dict[str, Any] | str | None
     sure: bool
-    viewpoint: View | None
+    viewpoint: ReplyViewpoint | None
     revision: int  # of the graph that was asked; -1: there was none
     llm_calls: Annotated[int, Field(ge=0)]
     ms: Annotated[float, Field(ge=0)]  # from the request's arrival to its reply
@@ -83,7 +83,7 @@ class Reply(_Part):
             raise ValueError("what was not found has no path, candidates, route or approach")
         if found and (self.path[-1:] != [step for step in self.path if step.id == self.object_id]):
             raise ValueError("the path ends at the object")
-        if found and self.object_id not in [one.id for one in self.candidates[:1]]:
+        if found and self.object_id not in [candidate.id for candidate in self.candidates[:1]]:
             raise ValueError("the object is the first candidate")
         return self
 
@@ -93,7 +93,7 @@ def finished(answer: dict[str, Any], ms: float) -> dict[str, Any]:
     return {"error": None} | answer | {"ms": round(ms, 1)}
 
 
-def refusal(reason: str, question_id: str = "", text: str = "", ms: float = 0.0) -> dict[str, Any]:
+def error_reply(reason: str, question_id: str = "", text: str = "", ms: float = 0.0) -> dict[str, Any]:
     """The fields of a reply that no node was asked for."""
     return {
         "status": "error",

@@ -112,7 +112,7 @@ class VariantRunner:
         return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(question), program)
 
     def program(self, question: AskedQuestion, how: str = "adapter") -> Program:
-        """The model's program: how is "adapter", "plain" (no adapter) or "examples" (no adapter, examples in prompt)."""
+        """The model's program. how: "adapter", "plain" (no adapter) or "examples" (in the prompt, no adapter)."""
         key = (how, question.text)
         if key in self._programs:
             self._saved_ms, self._saved_calls = self._parse_ms[key], 1

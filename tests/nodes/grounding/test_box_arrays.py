@@ -1,6 +1,6 @@
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import joined, layout_of
+from placegraph.nodes.grounding.box_arrays import concatenate, layout_of
 from placegraph.runtime.scene_graph import SceneGraph
 
 
@@ -34,7 +34,7 @@ def test_what_rooms_consist_of(house):
 
 def test_some_and_all_of_several(house):
     things = layout_of(house).all
-    both = joined([things.take([1]), things.take([0, 2])])
+    both = concatenate([things.take([1]), things.take([0, 2])])
     assert both.ids == ("O1", "O0", "O2")
     assert np.array_equal(both.center, things.center[[1, 0, 2]])
     assert len(things.take([])) == 0

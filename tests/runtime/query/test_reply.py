@@ -3,7 +3,7 @@ import json
 import pytest
 from pydantic import ValidationError
 
-from placegraph.runtime.query.reply import Reply, finished, refusal, to_bytes
+from placegraph.runtime.query.reply import Reply, error_reply, finished, to_bytes
 
 FOUND = {
     "status": "found", "question_id": "Q1", "question": "cup", "object_id": "O1", "name": "cup",
@@ -16,7 +16,7 @@ FOUND = {
 
 
 def test_a_refusal_is_a_reply_with_all_fields() -> None:
-    payload = to_bytes(refusal("why", "Q1", "the cup", 3.21))
+    payload = to_bytes(error_reply("why", "Q1", "the cup", 3.21))
     reply = Reply.model_validate_json(payload)
     assert (reply.error, reply.question_id, reply.question, reply.ms) == ("why", "Q1", "the cup", 3.2)
     assert set(json.loads(payload)) == set(Reply.model_fields) == set(finished(FOUND, 1.0))
