@@ -14,7 +14,7 @@ from pydantic import Field
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.grounding.answer_fields import error_answer, to_json
 from placegraph.nodes.grounding.llm_parser import default_adapter_path
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, PlaceNamer
 from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError
@@ -60,7 +60,7 @@ class Grounding(Node):
         encoder = TextEncoder()
         self._namer = PlaceNamer(self._model, encoder, config.room_types, config.location_types)
         place_types = (*config.room_types, *config.location_types)
-        names = Names(encoder.encode)
+        names = NameMatcher(encoder.encode)
         self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model)
         self._graph: SceneGraph | None = None
         self._revision = -1

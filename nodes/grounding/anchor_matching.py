@@ -1,6 +1,7 @@
-"""One condition between targets and the things that its anchor may be: the best pair of each target.
+"""Score one relation between all targets and all candidates of its anchor: each target's best anchor counts.
 
-Source: METHOD section 10, step 3. Departs: soft: a pair counts by the relation and by how well its anchor fits.
+Not as in the paper: nothing is chosen for good. A pair scores by the relation and by how well its anchor fits its own
+description, so a wrong anchor does not rule out the right target.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import Boxes, Layout, joined
+from placegraph.nodes.grounding.box_arrays import Boxes, Layout, concatenate
 from placegraph.nodes.grounding.program import Condition
-from placegraph.nodes.grounding.relations import HOLDS, Case, Fits, families
-from placegraph.nodes.grounding.relations.nearness import walled
-from placegraph.nodes.grounding.scoring import Weighing
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.relations import HOLDS, PairFits, RelationQuery, relations_by_name
+from placegraph.nodes.grounding.relations.nearness import in_different_rooms
+from placegraph.nodes.grounding.scoring import ScoredCandidates
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64, I64, Bool
 
 OTHER_ROOM = 0.5  # departs: what is said of two things is meant within one room; through a wall it counts half
@@ -27,36 +28,47 @@ UNDAMPED = frozenset(("closest", "farthest", "in", "holds", "with"))  # a wall b
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """What an anchor may be: m things, weights (m,) 0..1 with the best at 1, and how many there are said to be."""
+    """The m candidates of an anchor, best first; weights (m,) 0..1, the best 1.
+
+    trust: 0..1, how much a relation to them counts. count: how many anchors the request speaks of, 0 when it does not
+    say.
+    """
 
     boxes: Boxes
     weights: F64
     trust: float = 1.0
     count: int = 0
-    single: bool = False  # the map holds one thing that is called so
+    is_unique: bool = False  # exactly one thing in the map has the anchor's name
 
     @classmethod
-    def of(cls, weighings: Sequence[Weighing], trust: float, count: int) -> Anchors:
-        """The outcome of weighings, best first; at least one."""
-        boxes = joined([one.boxes for one in weighings])
-        weights = np.concatenate([one.best() for one in weighings])
+    def from_scores(cls, scored_parts: Sequence[ScoredCandidates], trust: float, count: int) -> Anchors:
+        """Anchors from one or more scored groups of candidates."""
+        boxes = concatenate([scored.boxes for scored in scored_parts])
+        weights = np.concatenate([scored.relative_scores() for scored in scored_parts])
         order = np.argsort(-weights, kind="stable")
-        return cls(boxes.take(order), weights[order], trust, count, len(weighings) == 1 and weighings[0].single)
+        return cls(
+            boxes.take(order), weights[order], trust, count, len(scored_parts) == 1 and scored_parts[0].is_unique
+        )
 
-    def first(self, most: int) -> Anchors:
-        """The best of them, at most so many."""
-        if len(self.boxes) <= most:
+    def top(self, max_count: int) -> Anchors:
+        """The best candidates, at most max_count."""
+        if len(self.boxes) <= max_count:
             return self
-        return Anchors(self.boxes.take(np.arange(most)), self.weights[:most], self.trust, self.count, self.single)
+        rows = np.arange(max_count)
+        return Anchors(self.boxes.take(rows), self.weights[:max_count], self.trust, self.count, self.is_unique)
 
-    def best(self, level: float = 0.999) -> Boxes:
-        """Those that fit as well as the best."""
-        return self.boxes.take(np.flatnonzero(self.weights >= level))
+    def best(self, min_weight: float = 0.999) -> Boxes:
+        """The candidates with at least this weight; by default those as good as the best."""
+        return self.boxes.take(np.flatnonzero(self.weights >= min_weight))
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a condition gives: values (n,), fits or measures, a sentence for each, and how much it decides."""
+class TargetFits:
+    """What a condition says of n targets: values (n,), a sentence for each, and how much the condition counts.
+
+    values: fits 0..1; for ranks a measure, greatest first. margin: ranks closer than this are equal.
+    trust: 0..1. known: whether the map holds any evidence.
+    """
 
     values: F64
     sentence: Callable[[int], str]
@@ -65,68 +77,70 @@ class Outcome:
     known: bool
 
 
-def related(condition: Condition, targets: Boxes, anchors: Sequence[Anchors], layout: Layout, views: Views) -> Outcome:
-    """A condition's best anchor for each of n targets; a thing is never its own anchor."""
+def match_anchors(
+    condition: Condition, targets: Boxes, anchors: Sequence[Anchors], layout: Layout, viewpoints: ViewpointSelector
+) -> TargetFits:
+    """Evaluate a condition for n targets, each with its best anchor. A target is never its own anchor."""
     name = condition.name
-    judge = families()[name].judge
+    evaluate = relations_by_name()[name].evaluate
     if not anchors:
-        return related_without(Case(name, targets, None, layout, views))
+        return fits_without_anchor(RelationQuery(name, targets, None, layout, viewpoints))
     first = anchors[0]
-    trust = min(one.trust for one in anchors)
+    trust = min(anchor.trust for anchor in anchors)
     if name == "between":
-        a, b, weights = _pairs(anchors)
-        case = Case(name, targets, first.boxes.take(a), layout, views, anchors[-1].boxes.take(b))
-        assert case.seconds is not None
-        own = _identical(targets, first.boxes.take(a)) | _identical(targets, case.seconds)
+        a, b, weights = _anchor_pairs(anchors)
+        query = RelationQuery(name, targets, first.boxes.take(a), layout, viewpoints, anchors[-1].boxes.take(b))
+        assert query.second_anchors is not None
+        is_self = _same_node(targets, first.boxes.take(a)) | _same_node(targets, query.second_anchors)
     else:
-        case = Case(name, targets, first.boxes, layout, views)
-        weights, own = first.weights, _identical(targets, first.boxes)
-    fits = judge(case)
+        query = RelationQuery(name, targets, first.boxes, layout, viewpoints)
+        weights, is_self = first.weights, _same_node(targets, first.boxes)
+    fits = evaluate(query)
     trust *= fits.trust
     if name in ("closest", "farthest"):
-        return _farther(fits, weights, own, name, trust)
-    assert case.anchors is not None
-    values = np.where(own, 0.0, fits.values)
-    if name not in UNDAMPED and case.anchors.ids and any(case.anchors.ids):
-        values = values * np.where(walled(targets, case.anchors) > 0, OTHER_ROOM, 1.0)
-    soft = values * weights[None]
-    best = soft.argmax(axis=1) if soft.size else np.zeros(len(targets), np.int64)
-    found = soft.max(axis=1, initial=0.0)
+        return _rank_by_distance(fits, weights, is_self, name, trust)
+    assert query.anchors is not None
+    values = np.where(is_self, 0.0, fits.values)
+    if name not in UNDAMPED and query.anchors.ids and any(query.anchors.ids):
+        values = values * np.where(in_different_rooms(targets, query.anchors) > 0, OTHER_ROOM, 1.0)
+    weighted = values * weights[None]
+    best = weighted.argmax(axis=1) if weighted.size else np.zeros(len(targets), np.int64)
+    scores = weighted.max(axis=1, initial=0.0)
     if first.count and len(anchors) == 1:
-        held = ((values >= HOLDS) & (weights[None] >= HOLDS)).sum(axis=1)
-        found = found * np.power(MISCOUNT, np.abs(held - first.count))
-    return Outcome(found, _sentences(fits, best, own, targets, name), 0.0, trust, fits.known)
+        matching = ((values >= HOLDS) & (weights[None] >= HOLDS)).sum(axis=1)
+        scores = scores * np.power(MISCOUNT, np.abs(matching - first.count))
+    return TargetFits(scores, _sentences(fits, best, is_self, targets, name), 0.0, trust, fits.known)
 
 
-def related_without(case: Case) -> Outcome:
-    """A condition without a thing."""
-    fits = families()[case.relation].judge(case)
-    return Outcome(fits.values[:, 0], lambda i: fits.sentence(i, 0), fits.margin, fits.trust, fits.known)
+def fits_without_anchor(query: RelationQuery) -> TargetFits:
+    """Evaluate a condition that has no anchor: "in the corner", "leftmost"."""
+    fits = relations_by_name()[query.relation].evaluate(query)
+    return TargetFits(fits.values[:, 0], lambda i: fits.sentence(i, 0), fits.margin, fits.trust, fits.known)
 
 
-def _farther(fits: Fits, weights: F64, own: Bool, name: str, trust: float) -> Outcome:
-    """Distances to the nearest anchor, where one that is less likely meant counts as farther away."""
-    doubt = -DOUBT_M * np.log2(np.maximum(weights, 1e-3))[None]
-    away = np.where(own, np.inf, np.abs(fits.values) + doubt)
-    best = away.argmin(axis=1) if away.size else np.zeros(len(away), np.int64)
-    nearest = away.min(axis=1, initial=np.inf)
+def _rank_by_distance(fits: PairFits, weights: F64, is_self: Bool, name: str, trust: float) -> TargetFits:
+    """Closest and farthest by the distance to the nearest anchor; a less likely anchor counts as farther away."""
+    penalty_m = -DOUBT_M * np.log2(np.maximum(weights, 1e-3))[None]
+    distances_m = np.where(is_self, np.inf, np.abs(fits.values) + penalty_m)
+    best = distances_m.argmin(axis=1) if distances_m.size else np.zeros(len(distances_m), np.int64)
+    nearest = distances_m.min(axis=1, initial=np.inf)
     values = np.where(np.isfinite(nearest), -nearest if name == "closest" else nearest, np.nan)
-    return Outcome(values, lambda i: fits.sentence(i, int(best[i])), fits.margin, trust, fits.known)
+    return TargetFits(values, lambda i: fits.sentence(i, int(best[i])), fits.margin, trust, fits.known)
 
 
-def _pairs(anchors: Sequence[Anchors]) -> tuple[I64, I64, F64]:
-    """Rows of the first and the second anchor of each pair, and the weights of the pairs."""
+def _anchor_pairs(anchors: Sequence[Anchors]) -> tuple[I64, I64, F64]:
+    """For "between": rows of the first and of the second anchor of each pair, and the pairs' weights."""
     first, second = anchors[0], anchors[-1]
     n, m = min(len(first.boxes), MAX_ENDS), min(len(second.boxes), MAX_ENDS)
     a, b = (part.ravel() for part in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
     same = np.array([first.boxes.ids[i] == second.boxes.ids[j] for i, j in zip(a, b, strict=True)], bool)
-    twice = (a >= b) if len(anchors) == 1 else same
-    a, b = a[~twice], b[~twice]
+    is_repeated = (a >= b) if len(anchors) == 1 else same
+    a, b = a[~is_repeated], b[~is_repeated]
     return a, b, first.weights[a] * second.weights[b]
 
 
-def _identical(targets: Boxes, anchors: Boxes) -> Bool:
-    """(n, m) whether a target is the anchor."""
+def _same_node(targets: Boxes, anchors: Boxes) -> Bool:
+    """(n, m) whether target and anchor are the same node."""
     rows = {name: j for j, name in enumerate(anchors.ids) if name}
     if len(rows) == sum(map(bool, anchors.ids)):
         same = np.zeros((len(targets), len(anchors)), bool)
@@ -137,9 +151,9 @@ def _identical(targets: Boxes, anchors: Boxes) -> Bool:
     return np.asarray(np.array(targets.ids, object)[:, None] == np.array(anchors.ids, object)[None])
 
 
-def _sentences(fits: Fits, best: I64, own: Bool, targets: Boxes, name: str) -> Callable[[int], str]:
+def _sentences(fits: PairFits, best: I64, is_self: Bool, targets: Boxes, name: str) -> Callable[[int], str]:
     def sentence(i: int) -> str:
-        if not own.shape[1] or own[i].all():
+        if not is_self.shape[1] or is_self[i].all():
             return f"{targets.labels[i]} has nothing to be {name}"
         return fits.sentence(i, int(best[i]))
 

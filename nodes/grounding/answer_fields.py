@@ -1,6 +1,6 @@
-"""The fields of an answer: what was found with its reasons and the way to it, or why there is nothing.
+"""Build the answer: the object found with its evidence and the route to it, or why there is none.
 
-Source: paper, "Object Grounding". Departs: evidence, candidates and approach beside the object.
+Source: paper, "Object Grounding". Not as in the paper: evidence, candidates, route and approach beside the object.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.program import Thing
-from placegraph.nodes.grounding.program_executor import Grounder
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Question
@@ -20,13 +20,13 @@ from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import approach_to_dict
 from placegraph.runtime.scene_graph.route import find_route
 
-NO_WAY: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
+NO_ROUTE: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
 
 
-def found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure: bool) -> dict[str, Any]:
+def found(graph: SceneGraph, ranking: Ranking, executor: ProgramExecutor, k: int, sure: bool) -> dict[str, Any]:
     """The fields that say what the best candidate is; the ranking holds at least one."""
     best = ranking.candidates[0]
-    view = grounder.viewpoint(best.node)
+    view = executor.viewpoint(best.node)
     return {
         "status": "found",
         "object_id": best.node.id,
@@ -37,26 +37,28 @@ def found(graph: SceneGraph, ranking: Ranking, grounder: Grounder, k: int, sure:
         "evidence": [*ranking.notes, *best.evidence],
         "candidates": [_candidate(candidate) for candidate in ranking.candidates[:k]],
         "sure": sure,
-        **_way_to(graph, best.node, grounder.asker_world),
+        **_route_fields(graph, best.node, executor.asker_world),
         "viewpoint": {"source": view.source, "xyz": numbers(view.xyz_world)},
     }
 
 
-def not_in_map(graph: SceneGraph, target: Thing, ranking: Ranking, grounder: Grounder, names: Names) -> dict[str, Any]:
+def not_in_map(
+    graph: SceneGraph, target: Thing, ranking: Ranking, executor: ProgramExecutor, names: NameMatcher
+) -> dict[str, Any]:
     """The fields that say that nothing fits, and what is there instead."""
     noun = "" if target.noun == "thing" else target.noun
     objects = graph.layer("object")
-    where = " there" if any(one.kind == "place" for one in target.conditions) else " in the map"
+    where = " there" if any(condition.kind == "place" for condition in target.conditions) else " in the map"
     missing = f"is called {noun}" if noun else "fits the question"
     evidence = [*ranking.notes, f"nothing{where} {missing}"]
-    elsewhere = names.named(noun, objects) if noun else []
+    elsewhere = names.best_matches(noun, objects) if noun else []
     if elsewhere:
         listed = [f"{fit.node.name} {fit.node.id} in {_place(graph, fit.node)}" for fit in elsewhere[:5]]
         evidence.append(f"elsewhere: {'; '.join(listed)}")
     else:
-        nearest = names.nearest(noun, objects)
+        nearest = names.nearest_names(noun, objects)
         evidence.append(f"the nearest names in the map: {', '.join(nearest) or 'none'}")
-    view = grounder.viewpoint(graph.building)
+    view = executor.viewpoint(graph.building)
     return {
         "status": "not_in_map",
         "object_id": None,
@@ -67,7 +69,7 @@ def not_in_map(graph: SceneGraph, target: Thing, ranking: Ranking, grounder: Gro
         "evidence": evidence,
         "candidates": [],
         "sure": ranking.sure and not elsewhere,
-        **NO_WAY,
+        **NO_ROUTE,
         "viewpoint": {"source": view.source, "xyz": numbers(view.xyz_world)},
     }
 
@@ -75,7 +77,7 @@ def not_in_map(graph: SceneGraph, target: Thing, ranking: Ranking, grounder: Gro
 def error_answer(question: Question, revision: int, reason: str) -> dict[str, Any]:
     """The fields of an answer that says why there is none."""
     asker = question.viewpoint_world
-    given = bool(np.isfinite(asker).all())
+    has_position = bool(np.isfinite(asker).all())
     return {
         "status": "error",
         "error": reason,
@@ -89,8 +91,8 @@ def error_answer(question: Question, revision: int, reason: str) -> dict[str, An
         "evidence": [],
         "candidates": [],
         "sure": False,
-        **NO_WAY,
-        "viewpoint": {"source": "asker", "xyz": numbers(asker)} if given else None,
+        **NO_ROUTE,
+        "viewpoint": {"source": "asker", "xyz": numbers(asker)} if has_position else None,
         "parse": None,
         "revision": revision,
         "llm_calls": 0,
@@ -102,20 +104,20 @@ def to_json(fields: dict[str, Any]) -> str:
     return json.dumps(fields, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
-def _way_to(graph: SceneGraph, node: Node, asker_world: F64) -> dict[str, Any]:
-    """Where to stand before a node, and how the asker gets there: rooms and connections in turn, metres.
+def _route_fields(graph: SceneGraph, node: Node, asker_world: F64) -> dict[str, Any]:
+    """Where to stand before a node, and the route there: rooms and connections in turn, its length in m.
 
-    To an object that cannot be approached the way into its room, as far as its middle; 0 m for who is there already.
+    When the object itself cannot be reached, the route leads to the centre of its room.
     """
     approach = approach_to_dict(node.approach)
-    way = NO_WAY | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
+    fields = NO_ROUTE | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
     if not np.isfinite(asker_world).all():
-        return way
+        return fields
     room = graph.room_of(node.id)
     route = find_route(graph, asker_world, node.id) or (find_route(graph, asker_world, room) if room else None)
     if route is None:
-        return way
-    return way | {"route": list(route.ids), "travel_m": numbers(route.length_m)}
+        return fields
+    return fields | {"route": list(route.ids), "travel_m": numbers(route.length_m)}
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:

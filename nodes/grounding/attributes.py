@@ -1,7 +1,7 @@
-"""How things look: colour, size and other words, and how well each of several things fits them.
+"""How well things fit words for their appearance: colour, size, and words that are found in tags.
 
-Source: METHOD section 10 ("attributes"). Departs: sizes are ranks among things of the same name; words that are neither
-colours nor sizes are looked for in the tags, and decide nothing where no tag holds them.
+Not in the paper. A size word ("big") is judged by the rank among things of the same name. A word that is neither colour
+nor size is looked up in the tags; when no tag contains it, it has no effect.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
-from placegraph.nodes.grounding.relations.extent import bulk, length_m
+from placegraph.nodes.grounding.relations.extent import length_m, log_size
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.scene_graph import Node
@@ -38,39 +38,39 @@ SIZES = {
     "low": "short", "long": "long", "wide": "long", "narrow": "narrow", "slim": "narrow", "thin": "narrow",
 }  # fmt: skip
 SHADES = {"dark": -1.0, "darker": -1.0, "deep": -1.0, "light": 1.0, "lighter": 1.0, "pale": 1.0, "bright": 0.0}
-SAID_BESIDE = frozenset(("color", "colour", "colored", "coloured", "in", "with", "a", "very", "mostly", "kind", "of"))
+FILLER_WORDS = frozenset(("color", "colour", "colored", "coloured", "in", "with", "a", "very", "mostly", "kind", "of"))
 COLOR_FALLOFF = 30.0  # departs: CIELAB distance at which a colour's fit falls to 1/e; a median under room light is dull
 SHADE_L = 20.0  # departs: CIELAB lightness between brown and dark brown
 UNKNOWN_FIT = 0.5  # an object whose colour was not seen neither fits nor fails
-FITS = 0.6  # departs: colour fit from which on an object is called by that colour; below it does not hold
+MIN_COLOR_FIT = 0.6  # departs: colour fit from which on an object is called by that colour; below it does not hold
 SIZE_LEAST = 0.4  # departs: the smallest of several is still called large by someone
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """How well n things fit the words: values (n,), whether the map knows, and a sentence for each."""
+class AppearanceFits:
+    """How well n things fit the words: values (n,) 0..1, whether the map holds evidence, a sentence for each."""
 
     values: F64
     known: bool
     sentences: tuple[str, ...]
 
 
-def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> Look:
-    """How well each of n nodes fits the words of an `is`; among (n,): those with whom sizes are compared."""
-    said = [word for word in tokens(words.replace("-", " ")) if word not in SAID_BESIDE]
+def appearance_fits(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> AppearanceFits:
+    """How well each of n nodes fits the words of an `is` condition; among (n,): the nodes whose sizes are compared."""
+    content_words = [word for word in tokens(words.replace("-", " ")) if word not in FILLER_WORDS]
     values, known = np.ones(len(nodes)), []
     notes: list[list[str]] = [[] for _ in nodes]
-    color = next((COLORS[stem] for word in said if (stem := _stem(word)) in COLORS), "")
-    shade = next((SHADES[word] for word in said if word in SHADES), 0.0)
-    if color or (shade and len(said) == 1):
-        fits, told = _colors(nodes, color, shade, said)
+    color = next((COLORS[stem] for word in content_words if (stem := _color_stem(word)) in COLORS), "")
+    shade = next((SHADES[word] for word in content_words if word in SHADES), 0.0)
+    if color or (shade and len(content_words) == 1):
+        fits, is_known = _colors(nodes, color, shade, content_words)
         values *= fits
-        known.append(told)
+        known.append(is_known)
         for i, node in enumerate(nodes):
-            seen = f"sRGB {node.color}" if node.color else "a colour that was not seen"
-            notes[i].append(f"{boxes.labels[i]} has {seen}: {words} fits {fits[i]:.2f}")
-    for word in said:
-        if _stem(word) in COLORS or word in SHADES:
+            color_text = f"sRGB {node.color}" if node.color else "a colour that was not seen"
+            notes[i].append(f"{boxes.labels[i]} has {color_text}: {words} fits {fits[i]:.2f}")
+    for word in content_words:
+        if _color_stem(word) in COLORS or word in SHADES:
             continue
         tagged = np.array([_is_tagged(node, word) for node in nodes], bool)
         if tagged.any():
@@ -86,37 +86,41 @@ def look(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> Look:
                 notes[i].append(f"{boxes.labels[i]} among {int(among.sum())}: {word} fits {fits[i]:.2f}")
         else:
             known.append(False)
-    return Look(values, bool(known) and all(known), tuple("; ".join(note) for note in notes))
+    return AppearanceFits(values, bool(known) and all(known), tuple("; ".join(note) for note in notes))
 
 
-def _stem(word: str) -> str:
-    """The colour in greenish, reddish, whitish."""
+def _color_stem(word: str) -> str:
+    """The colour in "greenish", "reddish", "whitish"; other words unchanged."""
     if not word.endswith("ish"):
         return word
     stem = word[:-3]
-    return next((one for one in (stem, stem + "e", re.sub(r"(.)\1$", r"\1", stem)) if one in COLORS), word)
+    return next((name for name in (stem, stem + "e", re.sub(r"(.)\1$", r"\1", stem)) if name in COLORS), word)
 
 
 def _is_tagged(node: Node, word: str) -> bool:
     return any(word in tokens(tag.name) for tag in node.tags)
 
 
-def _colors(nodes: Sequence[Node], color: str, shade: float, said: Sequence[str]) -> tuple[F64, bool]:
-    tagged = np.array([any(_is_tagged(node, word) for word in said if _stem(word) in COLORS) for node in nodes], bool)
-    seen = np.array([len(node.color) == 3 for node in nodes], bool)
+def _colors(nodes: Sequence[Node], color: str, shade: float, content_words: Sequence[str]) -> tuple[F64, bool]:
+    tagged = np.array(
+        [any(_is_tagged(node, word) for word in content_words if _color_stem(word) in COLORS) for node in nodes], bool
+    )
+    has_color = np.array([len(node.color) == 3 for node in nodes], bool)
     fits = np.full(len(nodes), UNKNOWN_FIT)
-    if seen.any():
+    if has_color.any():
         lab = _lab([node.color for node in nodes if len(node.color) == 3])
-        fits[seen] = _color_fits(lab, color, shade) if color else np.clip(0.5 + shade * (lab[:, 0] - 50) / 60, 0, 1)
-    # below the limit it does not hold (a half is the limit of all that holds)
-    fits = np.where(seen & (fits < FITS), fits * 0.5 / FITS, fits)
+        fits[has_color] = (
+            _color_fits(lab, color, shade) if color else np.clip(0.5 + shade * (lab[:, 0] - 50) / 60, 0, 1)
+        )
+    # scaled so that a fit of MIN_COLOR_FIT becomes 0.5, from which on any condition holds
+    fits = np.where(has_color & (fits < MIN_COLOR_FIT), fits * 0.5 / MIN_COLOR_FIT, fits)
     if tagged.any():
-        fits = np.where(tagged, 1.0, np.where(seen, fits, 0.3))
-    return fits, bool(seen.any() or tagged.any())
+        fits = np.where(tagged, 1.0, np.where(has_color, fits, 0.3))
+    return fits, bool(has_color.any() or tagged.any())
 
 
 def _color_fits(lab: F64, color: str, shade: float) -> F64:
-    """(n,) 1 where a colour is the nearest of the basic terms; dark and light ones have their own shade."""
+    """(n,) 1 where `color` is the nearest basic colour; "dark" and "light" (shade -1, 1) shift its lightness."""
     names = list(BASIC_COLORS)
     terms = _lab(list(BASIC_COLORS.values()))
     if shade:
@@ -127,14 +131,14 @@ def _color_fits(lab: F64, color: str, shade: float) -> F64:
 
 
 def color_fit(node: Node, color: str) -> float:
-    """How well an object's median colour is called `color`, 0..1: 1 when that is the nearest of the basic terms."""
+    """How well `color` names an object's median colour, 0..1; 1 when it is the nearest basic colour."""
     return float(_colors([node], color, 0.0, [color])[0][0])
 
 
 def size_fit(boxes: Boxes, size: str, among: Bool) -> F64:
-    """(n,) how well each is called large, small, tall, short, long or narrow among the others: by its rank."""
+    """(n,) how well large, small, tall, short, long or narrow fits each, by its rank among the others."""
     if size in ("large", "small"):
-        values = bulk(boxes)
+        values = log_size(boxes)
     elif size in ("tall", "short"):
         values = boxes.size[:, 2]
     else:

@@ -1,46 +1,53 @@
-"""Edges between the targets and the anchors of one request, in words: how far apart they are, and how they lie.
+"""Edges between targets and anchors in words, for the deductive mode: distance, and the relations that hold.
 
-Source: paper, "Selecting Related Objects" (metric and semantic edges); METHOD section 9. Departs: computed by the
-relations that the programs use: what is neither left nor right gets no such edge.
+Source: paper, "Selecting Related Objects" (metric and semantic edges). Not as in the paper: edges come from the same
+relations that programs use, so what is neither left nor right of an anchor gets neither edge.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from placegraph.nodes.grounding.program_executor import Grounder
-from placegraph.nodes.grounding.relations import HOLDS, Case, families
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
+from placegraph.nodes.grounding.relations import HOLDS, RelationQuery, relations_by_name
 from placegraph.runtime.language.prompts import safe_name
 from placegraph.runtime.scene_graph import Node
 from placegraph.runtime.vision.geometry import box_distance_m
 
-# paper: left, right, front, back, above, below. Departs: also on, in and under, which people say of what they see.
+# The paper has left, right, front, back, above and below; "on", "in" and "under" are added because people use them.
 SEMANTIC = ("left", "right", "front", "behind", "above", "under", "on", "in")
 OPPOSITE = {"left": "right", "right": "left", "front": "behind", "behind": "front"}
 MARGIN = 0.1  # departs: how much better than its opposite; a relation may fall back on nearness, which both then hold
 WORDS = {"left": "left of", "right": "right of", "front": "in front of"}  # as they read before a noun
 
 
-def edges(grounder: Grounder, target: Node, anchors: Sequence[Node], most: int) -> list[str]:
-    """The edges of a target, `0.40 m from bed O7, left of bed O7`: one text for each of its `most` nearest anchors."""
-    others = [anchor for anchor in anchors if anchor.id != target.id]
-    gaps = [box_distance_m(target.box, anchor.box) for anchor in others]
-    nearest = sorted(range(len(others)), key=lambda i: (gaps[i], i))[:most]
-    return [_edge(grounder, target, others[i], gaps[i]) for i in nearest]
+def edges(executor: ProgramExecutor, target: Node, anchors: Sequence[Node], max_count: int) -> list[str]:
+    """Texts like `0.40 m from bed O7, left of bed O7`, one for each of the target's max_count nearest anchors."""
+    anchors_left = [anchor for anchor in anchors if anchor.id != target.id]
+    gaps = [box_distance_m(target.box, anchor.box) for anchor in anchors_left]
+    nearest = sorted(range(len(anchors_left)), key=lambda i: (gaps[i], i))[:max_count]
+    return [_edge(executor, target, anchors_left[i], gaps[i]) for i in nearest]
 
 
-def _edge(grounder: Grounder, target: Node, anchor: Node, gap_m: float) -> str:
-    graph = grounder.graph
+def _edge(executor: ProgramExecutor, target: Node, anchor: Node, gap_m: float) -> str:
+    graph = executor.graph
     apart = ", in another room" if graph.room_of(target.id) != graph.room_of(anchor.id) else ""
     name = f"{safe_name(anchor.name, anchor.layer)} {anchor.id}"
-    fits = {relation: _fit(grounder, relation, target, anchor) for relation in SEMANTIC}
-    how = [one for one in SEMANTIC if fits[one] >= HOLDS and fits[one] > fits.get(OPPOSITE.get(one, ""), 0.0) + MARGIN]
-    words = [WORDS.get(one, one) for one in how if one != "in" or "on" not in how]  # "in" holds for what lies on, too
-    return ", ".join([f"{gap_m:.2f} m from {name}{apart}", *(f"{one} {name}" for one in words)])
+    fits = {relation: _fit(executor, relation, target, anchor) for relation in SEMANTIC}
+    holding = [
+        relation
+        for relation in SEMANTIC
+        if fits[relation] >= HOLDS and fits[relation] > fits.get(OPPOSITE.get(relation, ""), 0.0) + MARGIN
+    ]
+    # "in" also holds for what lies on something; then "on" alone is said
+    words = [WORDS.get(relation, relation) for relation in holding if relation != "in" or "on" not in holding]
+    return ", ".join([f"{gap_m:.2f} m from {name}{apart}", *(f"{word} {name}" for word in words)])
 
 
-def _fit(grounder: Grounder, relation: str, target: Node, anchor: Node) -> float:
-    layout = grounder.layout
-    one, other = (layout.all.take([layout.row[node.id]]) for node in (target, anchor))
-    fits = families()[relation].judge(Case(relation, one, other, layout, grounder.views))
+def _fit(executor: ProgramExecutor, relation: str, target: Node, anchor: Node) -> float:
+    layout = executor.layout
+    target_box, anchor_box = (layout.all.take([layout.row[node.id]]) for node in (target, anchor))
+    fits = relations_by_name()[relation].evaluate(
+        RelationQuery(relation, target_box, anchor_box, layout, executor.viewpoints)
+    )
     return float(fits.values[0, 0])

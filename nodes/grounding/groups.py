@@ -1,6 +1,6 @@
-"""Conditions on how a thing stands among its like: by itself, or one of so many.
+"""Conditions about things of one name: one that stands alone, or is one of a group of so many.
 
-Source: METHOD section 10 ("groups"). Departs: a group is what hangs together by gaps, at any of a few gaps.
+Not in the paper. A group is a connected component of things whose gaps are small; three gap limits are tried.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.program import Condition
-from placegraph.nodes.grounding.relations import apart_m, gaps_m
+from placegraph.nodes.grounding.relations import axis_gaps_m, distance_m
 from placegraph.runtime.arrays import F64, I64
 
 ALONE_M = 2.0  # departs: what has nothing like it within this is by itself; at half of it it may be
@@ -23,28 +23,28 @@ UNKNOWN = 0.5  # of what is not among those compared
 
 
 def group_fits(boxes: Boxes, rows: I64, condition: Condition) -> tuple[F64, Callable[[int], str]]:
-    """(n,) fits of `alone` or `count`, compared among some rows, and a sentence for each."""
+    """(n,) fits 0..1 of `alone` or `count` among the boxes of some rows, and a sentence for each box."""
     values = np.full(len(boxes), UNKNOWN)
     if len(rows) > MAX_PEERS:
         return values, lambda i: ""
     peers = boxes.take(rows)
-    gap = apart_m(gaps_m(peers, peers))
+    gap = distance_m(axis_gaps_m(peers, peers))
     if condition.name == "alone":
         np.fill_diagonal(gap, np.inf)
-        told = gap.min(axis=1) if len(rows) > 1 else np.full(len(rows), ALONE_M)
-        farthest = max(float(told.max(initial=0.0)), 1e-6)
-        values[rows] = np.maximum(np.clip(told / ALONE_M, 0, 1), told / farthest)
+        measured = gap.min(axis=1) if len(rows) > 1 else np.full(len(rows), ALONE_M)
+        farthest = max(float(measured.max(initial=0.0)), 1e-6)
+        values[rows] = np.maximum(np.clip(measured / ALONE_M, 0, 1), measured / farthest)
         text = "{}: the nearest of its kind is {:.2f} m away"
     else:
         sizes = [_group_sizes(gap, limit) for limit in GROUP_M]
         fitting = np.any([size == condition.number for size in sizes], axis=0) | (len(rows) == condition.number)
         values[rows] = np.where(fitting, 1.0, UNKNOWN)
-        text, told = "{} is in a group of {:.0f}", sizes[1]
-    words = {int(row): text.format(boxes.labels[row], value) for row, value in zip(rows, told, strict=True)}
+        text, measured = "{} is in a group of {:.0f}", sizes[1]
+    words = {int(row): text.format(boxes.labels[row], value) for row, value in zip(rows, measured, strict=True)}
     return values, lambda i: words.get(i, "")
 
 
 def _group_sizes(gap: F64, limit: float) -> F64:
-    """(n,) how many hang together with each by gaps (n, n) up to a limit; itself counted."""
+    """(n,) sizes of the connected components of each box, where boxes with a gap (n, n) up to limit are joined."""
     _, group = connected_components(csr_matrix(gap <= limit), directed=False)
     return np.asarray(np.bincount(group)[group], float)

@@ -1,7 +1,6 @@
-"""A request read into a program by the language model with its adapter, held to the grammar of that request's programs.
+"""Parse a request into a program with the language model and its adapter, constrained by the request's grammar.
 
-Source: METHOD section 10, step 1. The adapter is trained by
-tools/training/reader_training.py on the prompts written here.
+The adapter is trained by tools/training/reader.py on exactly the prompts that are written here.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 
 from placegraph.nodes.grounding.program import SAME_KIND, Thing
-from placegraph.nodes.grounding.program_syntax import grammar, read
+from placegraph.nodes.grounding.program_syntax import parse_program, program_grammar
 from placegraph.runtime.errors import ModelError, QueryError
 from placegraph.runtime.language.language_model import CompletionTruncated, LanguageModel
 from placegraph.runtime.language.prompts import fill_prompt
@@ -27,10 +26,10 @@ REPLY_TOKENS = 96  # departs: 57 are the most of 2,000 generated programs; a rep
 
 
 @dataclass(frozen=True)
-class Reading:
-    """What was read, and how likely the model found just this program (0 to 1)."""
+class ParsedRequest:
+    """The program's thing, and the probability that the model gave it (0..1)."""
 
-    thing: Thing | None  # None: what the model wrote did not end
+    thing: Thing | None  # None: the model's output was cut off before its end
     confidence: float
 
 
@@ -44,44 +43,45 @@ def default_adapter_path() -> Path:
     return path
 
 
-def asked(text: str) -> str:
-    """What stands between OPENING and the reply: the request's words as the grammar knows them."""
+def model_input(text: str) -> str:
+    """The prompt between OPENING and the model's output: the request's words as the grammar has them."""
     return " ".join(tokens(text)) + CLOSING
 
 
-def reply(program: str) -> str:
-    """A program's text as the model writes it."""
+def model_output(program: str) -> str:
+    """A program's text as the model is trained to write it."""
     return f" {program}\n"
 
 
-def read_request(model: LanguageModel, text: str, *, adapted: bool = True) -> Reading:
-    """The thing that a request describes.
+def parse_by_model(model: LanguageModel, text: str, *, use_adapter: bool = True) -> ParsedRequest:
+    """Parse a request; a program that does not end has confidence 0.
 
-    A program that does not end has no confidence at all. Raises QueryError for a request without a word or of over
-    MAX_WORDS words, and when the model has no adapter.
+    Raises QueryError for a request without a word or with more than MAX_WORDS, and when the model has no adapter.
     """
-    return _read(model, text, OPENING, adapted)
+    return _read(model, text, OPENING, use_adapter)
 
 
-def read_by_examples(model: LanguageModel, text: str) -> Reading:
-    """The same by the model as it comes, with examples in the prompt instead of an adapter. Raises QueryError."""
-    return _read(model, text, fill_prompt(__package__, "read") + "\n", adapted=False)
+def parse_by_examples(model: LanguageModel, text: str) -> ParsedRequest:
+    """Parse a request with examples in the prompt instead of an adapter. Raises QueryError."""
+    return _read(model, text, fill_prompt(__package__, "read") + "\n", use_adapter=False)
 
 
-def _read(model: LanguageModel, text: str, opening: str, adapted: bool) -> Reading:
+def _read(model: LanguageModel, text: str, prefix: str, use_adapter: bool) -> ParsedRequest:
     words = len(tokens(text))
     if words > MAX_WORDS:
         raise QueryError(f"the request has {words} words and marks; at most {MAX_WORDS} are read")
     try:
-        said = model.complete(asked(text), grammar(text), REPLY_TOKENS, prefix=opening, use_adapter=adapted)
+        completion = model.complete(
+            model_input(text), program_grammar(text), REPLY_TOKENS, prefix=prefix, use_adapter=use_adapter
+        )
     except CompletionTruncated:
-        return Reading(None, 0.0)
-    return Reading(with_noun(read(said.text)), math.exp(said.log_probability))
+        return ParsedRequest(None, 0.0)
+    return ParsedRequest(resolve_same_kind(parse_program(completion.text)), math.exp(completion.log_probability))
 
 
-def with_noun(thing: Thing) -> Thing:
-    """A target that is called "one" gets the noun of what is looked at: "facing the lamps, the one on the left"."""
-    faced = next(thing.said("looking"), None)
-    if thing.noun != SAME_KIND or faced is None or faced.things[0].noun == SAME_KIND:
+def resolve_same_kind(thing: Thing) -> Thing:
+    """Give a target "one" the noun of what the viewer faces: "facing the lamps, the one on the left"."""
+    facing = next(thing.conditions_named("looking"), None)
+    if thing.noun != SAME_KIND or facing is None or facing.things[0].noun == SAME_KIND:
         return thing
-    return thing.model_copy(update={"noun": faced.things[0].noun})
+    return thing.model_copy(update={"noun": facing.things[0].noun})

@@ -1,7 +1,4 @@
-"""How well a noun names a node: same words, same head noun, synonyms, then word embeddings; and slips of spelling.
-
-Source: METHOD section 3 ("couch" meets "sofa") and section 10 (most loss is in matching words to tags).
-"""
+"""How well a noun names a node: same words, same head noun, synonyms, misspellings, then word embeddings."""
 
 from __future__ import annotations
 
@@ -29,118 +26,118 @@ MAX_KEPT = 50_000  # pairs of words whose likeness is remembered
 
 
 @dataclass(frozen=True)
-class Fit:
-    """How well a noun names one node, 0..1, and the tag that decided it."""
+class NameMatch:
+    """A node, how well a noun names it (0..1), and the tag that gave this score."""
 
     node: Node
     score: float
     tag: str
 
 
-class Names:
+class NameMatcher:
     """Compares nouns with tags."""
 
     def __init__(self, encode: Encode) -> None:
         self._encode = encode
-        self._likeness: dict[tuple[str, str], float] = {}
+        self._similarity: dict[tuple[str, str], float] = {}
         self._rows: dict[str, F32] = {}
 
-    def likeness(self, noun: str, tag: str) -> float:
-        """How well a noun names a thing with this tag, 0..1; 0: not at all. Both in any form."""
-        if (noun, tag) not in self._likeness:
-            if len(self._likeness) >= MAX_KEPT:
-                self._likeness.clear()
-            self._likeness[noun, tag] = self._compare(normal_form(noun), normal_form(tag))
-        return self._likeness[noun, tag]
+    def similarity(self, noun: str, tag: str) -> float:
+        """How well a noun names a thing with this tag, 0..1; 0: not at all. Both may be plural."""
+        if (noun, tag) not in self._similarity:
+            if len(self._similarity) >= MAX_KEPT:
+                self._similarity.clear()
+            self._similarity[noun, tag] = self._compare(normal_form(noun), normal_form(tag))
+        return self._similarity[noun, tag]
 
     def _compare(self, noun: str, tag: str) -> float:
         if not noun or not tag:
             return 0.0
-        known = _by_words(noun, tag)
-        if known:
-            return known
+        by_words = _word_similarity(noun, tag)
+        if by_words:
+            return by_words
         if noun.startswith(tag) or tag.startswith(noun):
-            return 0.0  # a tablecloth is no table, and a bedroom no bed: the last part of a compound says what it is
+            return 0.0  # the last part of a compound says what it is: a tablecloth is no table, a bedroom no bed
         cosine = self.cosine(noun, tag)
         return cosine if cosine >= COSINE else 0.0
 
     def cosine(self, a: str, b: str) -> float:
         """Cosine of two phrases' embeddings."""
-        return float(self._row(a) @ self._row(b))
+        return float(self._in_front_of_row(a) @ self._in_front_of_row(b))
 
-    def _learn(self, nodes: Sequence[Node]) -> None:
-        """Encode all their tags at once: one at a time takes a hundred times as long."""
+    def _encode_tags(self, nodes: Sequence[Node]) -> None:
+        """Encode all tags of the nodes in one batch, which is a hundred times as fast as one by one."""
         if len(self._rows) >= MAX_KEPT:
             self._rows.clear()
         unknown = sorted({normal_form(tag.name) for node in nodes for tag in node.tags} - self._rows.keys())
         if unknown:
             self._rows.update(zip(unknown, self._encode(unknown), strict=True))
 
-    def _row(self, text: str) -> F32:
+    def _in_front_of_row(self, text: str) -> F32:
         if text not in self._rows:
             if len(self._rows) >= MAX_KEPT:
                 self._rows.clear()
             self._rows[text] = self._encode([text])[0]
         return self._rows[text]
 
-    def fit(self, noun: str, node: Node) -> Fit:
-        """How well a noun names a node, over its tags; an id names exactly its node, an empty noun everything."""
+    def match(self, noun: str, node: Node) -> NameMatch:
+        """The best match over a node's tags. An id names exactly its node; an empty noun names everything."""
         if not noun:
-            return Fit(node, 1.0, node.name)
+            return NameMatch(node, 1.0, node.name)
         if ID_PATTERN.fullmatch(noun.upper()):
-            return Fit(node, float(noun.upper() == node.id), node.id)
-        return self._best(noun, node, self.likeness)
+            return NameMatch(node, float(noun.upper() == node.id), node.id)
+        return self._best(noun, node, self.similarity)
 
     @staticmethod
-    def _best(noun: str, node: Node, likeness: Callable[[str, str], float]) -> Fit:
-        best = Fit(node, 0.0, "")
+    def _best(noun: str, node: Node, similarity: Callable[[str, str], float]) -> NameMatch:
+        best = NameMatch(node, 0.0, "")
         strongest = max((tag.weight for tag in node.tags), default=0.0)
         for tag in node.tags:
             share = tag.weight / strongest if strongest > 0 else 1.0
-            score = likeness(noun, tag.name) * (0.5 + 0.5 * share) if share >= TAG_SHARE else 0.0
+            score = similarity(noun, tag.name) * (0.5 + 0.5 * share) if share >= TAG_SHARE else 0.0
             if score > best.score:
-                best = Fit(node, score, tag.name)
+                best = NameMatch(node, score, tag.name)
         return best
 
-    def called(self, noun: str, nodes: Sequence[Node]) -> list[Fit]:
-        """All nodes that the noun names, well or less well, in the order given."""
-        self._learn(nodes)
-        return [fit for fit in (self.fit(noun, node) for node in nodes) if fit.score > 0]
+    def matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
+        """All nodes that the noun names with a score above 0, in the order given."""
+        self._encode_tags(nodes)
+        return [match for match in (self.match(noun, node) for node in nodes) if match.score > 0]
 
-    def fair(self, noun: str, nodes: Sequence[Node]) -> list[Fit]:
-        """Where nothing is called so: the nodes whose name is the most like the noun, if that is fair; else none."""
+    def nearest_matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
+        """For a noun that names nothing: the nodes with the most similar names, if they are similar enough."""
         if not noun or ID_PATTERN.fullmatch(noun.upper()):
             return []
-        self._learn(nodes)
-        fits = [self._best(normal_form(noun), node, self._loose) for node in nodes]
-        best = max((fit.score for fit in fits), default=0.0)
-        return [fit for fit in fits if best >= FAIR and fit.score >= best - STEP / 2]
+        self._encode_tags(nodes)
+        matches = [self._best(normal_form(noun), node, self._cosine_similarity) for node in nodes]
+        best = max((match.score for match in matches), default=0.0)
+        return [match for match in matches if best >= FAIR and match.score >= best - STEP / 2]
 
-    def _loose(self, noun: str, tag: str) -> float:
+    def _cosine_similarity(self, noun: str, tag: str) -> float:
         return max(self.cosine(noun, normal_form(tag)), 0.0)
 
-    def named(self, noun: str, nodes: Sequence[Node], step: float = STEP) -> list[Fit]:
-        """The nodes that the noun names best, in the order given: those within `step` (0..1) of the best fit."""
-        fits = self.called(noun, nodes)
-        best = max((fit.score for fit in fits), default=0.0)
-        return [fit for fit in fits if fit.score >= best - step]
+    def best_matches(self, noun: str, nodes: Sequence[Node], step: float = STEP) -> list[NameMatch]:
+        """The nodes whose score is within `step` of the best score, in the order given."""
+        matches = self.matches(noun, nodes)
+        best = max((match.score for match in matches), default=0.0)
+        return [match for match in matches if match.score >= best - step]
 
     def is_known(self, noun: str, nodes: Iterable[Node]) -> bool:
-        """Whether any of the nodes is called so."""
-        return any(self.fit(noun, node).score > 0 for node in nodes)
+        """Whether the noun names any of the nodes."""
+        return any(self.match(noun, node).score > 0 for node in nodes)
 
-    def nearest(self, noun: str, nodes: Iterable[Node], most: int = NEAREST_NAMES) -> list[str]:
-        """The names in the map most like a noun, best first, at most so many."""
+    def nearest_names(self, noun: str, nodes: Iterable[Node], max_count: int = NEAREST_NAMES) -> list[str]:
+        """The names in the map that are the most similar to a noun, best first."""
         names = sorted({node.tags[0].name for node in nodes if node.tags})
         if not names or not noun:
-            return names[:most]
+            return names[:max_count]
         rows = self._encode([noun, *names])
         order = np.argsort(-(rows[1:] @ rows[0]), kind="stable")
-        return [names[i] for i in order[:most]]
+        return [names[i] for i in order[:max_count]]
 
 
-def _by_words(noun: str, tag: str) -> float:
-    """Likeness by the words themselves, both in normal form; 0 where they say nothing."""
+def _word_similarity(noun: str, tag: str) -> float:
+    """Similarity 0..1 by the words alone, both in normal form; 0 when they have nothing in common."""
     if noun == tag or _one_word(noun) == _one_word(tag):
         return SAME
     if tag.endswith(f" {noun}"):
@@ -149,24 +146,24 @@ def _by_words(noun: str, tag: str) -> float:
         return SYNONYM + SHARED * noun.endswith(f" {tag}")  # of a duffel bag: a bag before a backpack
     if tag in hyponyms().get(noun, ()):
         return MEMBER  # a chair is a seat
-    if is_slip(noun, tag):
+    if is_misspelling(noun, tag):
         return SLIP
     if noun.endswith(f" {tag}"):
         return HEAD  # a "wooden chair" may be tagged chair
-    found = 0.0
-    for own in _heads(noun):
-        for other in _heads(tag):
-            if (own, other) == (noun, tag):
+    best_score = 0.0
+    for noun_head in _heads(noun):
+        for tag_head in _heads(tag):
+            if (noun_head, tag_head) == (noun, tag):
                 continue
-            worth = (HEAD if own != noun else 1.0) * (KIND if other != tag else 1.0)
-            if _are_synonyms(own, other) or (own == other and own != noun and other != tag):
-                # "leather couch" and "green sofa"; the words before the heads may speak against each other
-                found = max(found, worth * (SYNONYM if own != other else 0.9))
-            elif other in hyponyms().get(own, ()):
-                found = max(found, worth * MEMBER)
-            elif is_slip(own, other):
-                found = max(found, worth * SLIP)
-    return found
+            weight = (HEAD if noun_head != noun else 1.0) * (KIND if tag_head != tag else 1.0)
+            if _are_synonyms(noun_head, tag_head) or (noun_head == tag_head and noun_head != noun and tag_head != tag):
+                # "leather couch" and "green sofa": less, because the words before the heads may contradict each other
+                best_score = max(best_score, weight * (SYNONYM if noun_head != tag_head else 0.9))
+            elif tag_head in hyponyms().get(noun_head, ()):
+                best_score = max(best_score, weight * MEMBER)
+            elif is_misspelling(noun_head, tag_head):
+                best_score = max(best_score, weight * SLIP)
+    return best_score
 
 
 def _one_word(text: str) -> str:
@@ -178,30 +175,30 @@ def _are_synonyms(a: str, b: str) -> bool:
 
 
 def _heads(text: str) -> list[str]:
-    """A noun phrase, and what is left of it when words are taken off its front."""
+    """A noun phrase and its shorter ends: "big red box" gives "big red box", "red box" and "box"."""
     words = text.split()
     return [" ".join(words[i:]) for i in range(len(words))]
 
 
-def is_slip(noun: str, word: str) -> bool:
-    """Whether a noun is another word with one wrong letter, or two where both are long."""
+def is_misspelling(noun: str, word: str) -> bool:
+    """Whether a noun is a misspelling of a word: one wrong letter, or two in long words."""
     shorter = min(len(noun), len(word))
-    most = 0 if shorter < SLIP_LETTERS[0] else 1 if shorter < SLIP_LETTERS[1] else 2
-    if not most or abs(len(noun) - len(word)) > most or noun[0] != word[0]:
+    max_edits = 0 if shorter < SLIP_LETTERS[0] else 1 if shorter < SLIP_LETTERS[1] else 2
+    if not max_edits or abs(len(noun) - len(word)) > max_edits or noun[0] != word[0]:
         return False
     if noun in synonyms() or noun in hyponyms():
-        return False  # a word of its own: a desk is no dusk
-    return _edits(noun, word) <= most
+        return False  # the noun is itself a known word
+    return _edit_distance(noun, word) <= max_edits
 
 
-def _edits(a: str, b: str) -> int:
-    """Letters left out, put in, changed or swapped with their neighbour between two words."""
+def _edit_distance(a: str, b: str) -> int:
+    """Damerau-Levenshtein distance: letters omitted, inserted, changed or swapped with a neighbour."""
     rows = [list(range(len(b) + 1))]
     for i, letter in enumerate(a, 1):
         row = [i]
-        for j, other in enumerate(b, 1):
-            row.append(min(row[-1] + 1, rows[-1][j] + 1, rows[-1][j - 1] + (letter != other)))
-            if i > 1 and j > 1 and letter == b[j - 2] and a[i - 2] == other:
+        for j, b_letter in enumerate(b, 1):
+            row.append(min(row[-1] + 1, rows[-1][j] + 1, rows[-1][j - 1] + (letter != b_letter)))
+            if i > 1 and j > 1 and letter == b[j - 2] and a[i - 2] == b_letter:
                 row[j] = min(row[j], rows[-2][j - 2] + 1)
         rows.append(row)
     return rows[-1][-1]

@@ -1,6 +1,6 @@
-"""A question cut into pieces: things, relations, places, ordinals and breaks, in the order they are said.
+"""Segment a question into phrases: things, relations, places, ordinals and breaks, in their order.
 
-Longest trigger phrases win; the words between triggers and filler words are noun phrases.
+The longest trigger phrase wins; runs of words between triggers and filler words are noun phrases.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass, field
 
 from placegraph.nodes.grounding.attributes import COLORS
-from placegraph.nodes.grounding.relations import triggers
+from placegraph.nodes.grounding.relations import trigger_phrases
 from placegraph.runtime.language.word_forms import is_plural, normal_form, singular, tokens, word_list
 
 FILLER = word_list("filler.txt")
@@ -40,7 +40,7 @@ FLOOR_KINDS = frozenset(("ground", "top", "upper", "lower", "lowest", "highest",
     ORDINALS
 )
 BREAKS = frozenset(",.;:?!")
-CANS = frozenset(("trash", "garbage", "waste", "recycling", "recycle", "rubbish", "watering"))  # what is a can
+CAN_KINDS = frozenset(("trash", "garbage", "waste", "recycling", "recycle", "rubbish", "watering"))  # what is a can
 VIEWS = {
     tuple(phrase.split()): "from"
     for phrase in ("seen from", "as seen from", "when seen from", "viewed from", "when viewed from", "looking from")
@@ -53,11 +53,11 @@ IDIOMS = (
     "so that", "by the way", "go to", "from where i stand", "from where i am", "from here",
 )  # fmt: skip
 
-# Only these are taken off a noun: a "low table" and a "high chair" are things of their own.
+# Only these sizes are separated from a noun: "low table" and "high chair" are kinds of things.
 SIZES = {"big": "large", "large": "large", "huge": "large", "small": "small", "little": "small", "tiny": "small"}
 
 OWNS = r"\b(?:that |which )?(?:has|have|with|holds|holding|carries|carrying) (.{1,60}?) "
-TURNED = (
+INVERSE_PHRASES = (
     (re.compile(OWNS + r"(?:on|on top of) it\b", re.IGNORECASE), r"holding \1"),
     (re.compile(OWNS + r"on top\b(?! of)", re.IGNORECASE), r"holding \1"),
     (re.compile(OWNS + r"(?:next to|near|beside|by) it\b", re.IGNORECASE), r"near \1"),
@@ -69,8 +69,8 @@ TURNED = (
 
 
 @dataclass
-class Piece:
-    """One piece: `kind` is thing, relation, floor, ordinal, and, not, or break."""
+class Phrase:
+    """One phrase: `kind` is thing, place, relation, floor, ordinal, to, and, not, or break."""
 
     kind: str
     text: str = ""
@@ -81,69 +81,69 @@ class Piece:
     words: list[str] = field(default_factory=list)
 
 
-def turned(text: str) -> str:
-    """Turn round the conditions that are told of the anchor: "with the lamp on it" becomes "under the lamp"."""
-    for pattern, replacement in TURNED:
+def rewrite_inverse_phrases(text: str) -> str:
+    """Invert conditions that are said of the anchor: "with the lamp on it" becomes "holding the lamp"."""
+    for pattern, replacement in INVERSE_PHRASES:
         text = pattern.sub(replacement, text)
     return text
 
 
-def cut(text: str) -> list[Piece]:
-    """Cut a question into pieces; filler words vanish but end a noun phrase."""
-    words, pieces, i = tokens(turned(text)), [], 0
-    phrases = triggers() | VIEWS
-    longest = max(map(len, phrases))
+def segment(text: str) -> list[Phrase]:
+    """Segment a question. Filler words are dropped but end a noun phrase."""
+    words, phrases, i = tokens(rewrite_inverse_phrases(text)), [], 0
+    triggers = trigger_phrases() | VIEWS
+    longest = max(map(len, triggers))
     idioms = [tuple(idiom.split()) for idiom in IDIOMS]
     pending: list[str] = []
 
     def flush() -> None:
         if pending:
-            pieces.extend(_things(pending))
+            phrases.extend(_noun_phrase(pending))
             pending.clear()
 
     while i < len(words):
         idiom = next((idiom for idiom in idioms if words[i : i + len(idiom)] == idiom), None)
         floor = _floor(words, i)
-        size = next((n for n in range(longest, 0, -1) if words[i : i + n] in phrases), 0)
+        size = next((n for n in range(longest, 0, -1) if words[i : i + n] in triggers), 0)
         if idiom and len(idiom) >= size:
             flush()
             i += len(idiom)
         elif floor:
             flush()
-            pieces.append(Piece("floor", floor[1]))
+            phrases.append(Phrase("floor", floor[1]))
             i += floor[0]
         elif size:
             flush()
-            pieces.append(Piece("relation", phrases[words[i : i + size]], words=list(words[i : i + size])))
+            phrases.append(Phrase("relation", triggers[words[i : i + size]], words=list(words[i : i + size])))
             i += size
         else:
             i += 1
-            _single(words[i - 1], words[i] if i < len(words) else "", pending, pieces, flush)
+            _single(words[i - 1], words[i] if i < len(words) else "", pending, phrases, flush)
     flush()
-    return pieces
+    return phrases
 
 
-def _single(word: str, following: str, pending: list[str], pieces: list[Piece], flush: object) -> None:
-    """File one word that starts no phrase."""
+def _single(word: str, following: str, pending: list[str], phrases: list[Phrase], flush: object) -> None:
+    """Add one word that starts no trigger phrase: to the pending noun phrase, or as a phrase of its own."""
     assert callable(flush)
     if word in BREAKS:
         flush()
-        pieces.append(Piece("break"))
+        phrases.append(Phrase("break"))
     elif word in ("and", "not", "isn't", "aren't"):
         flush()
-        pieces.append(Piece("and" if word == "and" else "not"))
+        phrases.append(Phrase("and" if word == "and" else "not"))
     elif word in ORDINALS:
         flush()
-        pieces.append(Piece("ordinal", number=ORDINALS[word]))
+        phrases.append(Phrase("ordinal", number=ORDINALS[word]))
     elif word in SIDES and following and following not in FILLER and following not in BREAKS:
         flush()
-        pieces.append(Piece("relation", SIDES[word]))  # "the left chair", "the middle one"
+        phrases.append(Phrase("relation", SIDES[word]))  # "the left chair", "the middle one"
     elif word in ("to", "from") and not pending:
-        pieces.append(Piece("to"))
+        phrases.append(Phrase("to"))
     elif word in ("to", "from"):
         flush()
-        pieces.append(Piece("to"))
-    elif word == "can" and pending and pending[-1] in CANS:
+        phrases.append(Phrase("to"))
+    elif word == "can" and pending and pending[-1] in CAN_KINDS:
         pending.append(word)
     elif word in FILLER:
         flush()
@@ -152,7 +152,7 @@ def _single(word: str, following: str, pending: list[str], pieces: list[Piece], 
 
 
 def _floor(words: tuple[str, ...], i: int) -> tuple[int, str] | None:
-    """Length and text of the floor phrase that starts at word i."""
+    """The number of words and the text of the floor phrase that starts at word i; None when there is none."""
     skip = 0
     while words[i + skip : i + skip + 1] and words[i + skip] in ("on", "at", "in", "the", "from", "of") and skip < 2:
         skip += 1
@@ -166,16 +166,16 @@ def _floor(words: tuple[str, ...], i: int) -> tuple[int, str] | None:
     return None
 
 
-def _things(words: list[str]) -> list[Piece]:
-    """A run of content words as a noun phrase with its colour and size taken off."""
+def _noun_phrase(words: list[str]) -> list[Phrase]:
+    """A run of content words as a noun phrase, with its colour and size separated."""
     noun = [word for word in words if word not in COLORS and word not in SIZES]
     color = next((COLORS[word] for word in words if word in COLORS), "")
     size = next((SIZES[word] for word in words if word in SIZES), "")
     if noun and all(word in ANYTHING for word in noun):
-        return [Piece("thing", "", color, size, plural=singular(noun[-1]) != noun[-1], words=["thing"])]
+        return [Phrase("thing", "", color, size, plural=singular(noun[-1]) != noun[-1], words=["thing"])]
     if not noun:
         # "the red one", "which is the orange": the colour word is all there is
-        return [Piece("thing", "", color, size, words=list(words))]
+        return [Phrase("thing", "", color, size, words=list(words))]
     kept = [word for word in noun if word not in ANYTHING]
     text = " ".join(kept)
-    return [Piece("thing", normal_form(text), color, size, is_plural(text), words=kept)]
+    return [Phrase("thing", normal_form(text), color, size, is_plural(text), words=kept)]

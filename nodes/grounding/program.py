@@ -1,8 +1,8 @@
-"""The typed program that a request is read into: a thing to find and the conditions on it, nested.
+"""The typed program that a request is parsed into: a thing to find and its conditions, nested.
 
-One schema for all that people say of an object (target, attributes, anchors with conditions of their own, relations,
-negation, ordinals, superlatives, groups, viewpoints, room, floor). Source: METHOD section 10, step 1; the conventions
-of `CONDITIONS` come from reading 400 requests of people (Nr3D). Departs: the paper has targets and anchors only.
+One schema for everything people say of an object: attributes, anchors with conditions of their own, relations,
+negation, ordinals, superlatives, groups, viewpoints, room and floor. The conventions of `CONDITIONS` come from reading
+400 requests of people (Nr3D). Not as in the paper, which has targets and anchors only.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Kind = Literal["look", "group", "relation", "rank", "view", "place", "purpose"]
 
 
 @dataclass(frozen=True)
-class Form:
-    """What a condition of one name holds: fewest and most things, whether words or a number, and what it means."""
+class ConditionForm:
+    """What a condition of one name takes: how many things (minimum, maximum), words, a number; and its meaning."""
 
     kind: Kind
     things: tuple[int, int]
@@ -34,60 +34,64 @@ class Form:
     number: Literal["never", "may", "must"] = "never"
 
 
-CONDITIONS: dict[str, Form] = {
-    "is": Form("look", (0, 0), "colour, size, material, shape or state, as said: red, big, wooden, round, open", True),
-    "count": Form("group", (0, 0), "is one of so many; of an anchor: there are so many", number="must"),
-    "alone": Form("group", (0, 0), "by itself, away from its like"),
-    "near": Form("relation", (1, 1), "next to, beside, by, close to, at, around it"),
-    "on": Form("relation", (1, 1), "on, on top of, hanging on"),
-    "under": Form("relation", (1, 1), "under, below, beneath"),
-    "above": Form("relation", (1, 1), "above, over"),
-    "in": Form("relation", (1, 1), "inside of a thing (of a room: room)"),
-    "holds": Form("relation", (1, 1), "has it on top or inside"),
-    "with": Form("relation", (1, 1), "with, has, as a part or beside it"),
-    "left": Form("relation", (1, 1), "left of it, on its left side"),
-    "right": Form("relation", (1, 1), "right of it, on its right side"),
-    "front": Form("relation", (1, 1), "in front of it"),
-    "behind": Form("relation", (1, 1), "behind it, at the back of it"),
-    "across": Form("relation", (1, 1), "across from, opposite of it"),
-    "against": Form("relation", (1, 1), "against, touching it"),
-    "end": Form("relation", (1, 1), "at the end, foot or head of it"),
-    "along": Form("relation", (1, 1), "on the same wall or side of the room as it"),
-    "facing": Form("relation", (1, 1), "turned towards it"),
-    "between": Form("relation", (1, 2), "between two things, or those of one kind"),
-    "corner": Form("relation", (0, 1), "in a corner of the room, or of the thing"),
-    "center": Form("relation", (0, 1), "in the middle of the room, or of the thing"),
-    "closest": Form("rank", (0, 1), "closest, nearest, closer; without a thing: to the viewer", number="may"),
-    "farthest": Form("rank", (0, 1), "farthest, far from, away from; without a thing: from the viewer", number="may"),
-    "leftmost": Form("rank", (0, 0), "the left one, on the left, first from the left", number="may"),
-    "rightmost": Form("rank", (0, 0), "the right one, on the right, second from the right: 2", number="may"),
-    "frontmost": Form("rank", (0, 0), "the front one", number="may"),
-    "backmost": Form("rank", (0, 0), "the back one, at the back", number="may"),
-    "middle": Form("rank", (0, 0), "the middle one of several"),
-    "nth": Form("rank", (0, 0), "the first, second, third with no side named", number="must"),
-    "largest": Form("rank", (0, 0), "largest, larger, biggest", number="may"),
-    "smallest": Form("rank", (0, 0), "smallest, smaller", number="may"),
-    "tallest": Form("rank", (0, 0), "tallest, taller", number="may"),
-    "shortest": Form("rank", (0, 0), "shortest, shorter", number="may"),
-    "longest": Form("rank", (0, 0), "longest, longer, widest, wider", number="may"),
-    "highest": Form("rank", (0, 0), "highest, upper, top", number="may"),
-    "lowest": Form("rank", (0, 0), "lowest, lower, bottom", number="may"),
-    "looking": Form("view", (1, 1), "seen by one who faces it: facing, looking at, from the foot of it"),
-    "from": Form("view", (1, 1), "seen from it: standing at it, entering by it, lying on it"),
-    "back": Form("view", (1, 1), "seen with the back to it"),
-    "room": Form("place", (1, 1), "in a room or area: bathroom, work area, second bedroom"),
-    "floor": Form("place", (0, 0), "on a floor of the building, as said: upstairs, second floor", True),
-    "for": Form("purpose", (0, 0), "what the thing is used for, as said: sit on", True),
+CONDITIONS: dict[str, ConditionForm] = {
+    "is": ConditionForm(
+        "look", (0, 0), "colour, size, material, shape or state, as said: red, big, wooden, round, open", True
+    ),
+    "count": ConditionForm("group", (0, 0), "is one of so many; of an anchor: there are so many", number="must"),
+    "alone": ConditionForm("group", (0, 0), "by itself, away from its like"),
+    "near": ConditionForm("relation", (1, 1), "next to, beside, by, close to, at, around it"),
+    "on": ConditionForm("relation", (1, 1), "on, on top of, hanging on"),
+    "under": ConditionForm("relation", (1, 1), "under, below, beneath"),
+    "above": ConditionForm("relation", (1, 1), "above, over"),
+    "in": ConditionForm("relation", (1, 1), "inside of a thing (of a room: room)"),
+    "holds": ConditionForm("relation", (1, 1), "has it on top or inside"),
+    "with": ConditionForm("relation", (1, 1), "with, has, as a part or beside it"),
+    "left": ConditionForm("relation", (1, 1), "left of it, on its left side"),
+    "right": ConditionForm("relation", (1, 1), "right of it, on its right side"),
+    "front": ConditionForm("relation", (1, 1), "in front of it"),
+    "behind": ConditionForm("relation", (1, 1), "behind it, at the back of it"),
+    "across": ConditionForm("relation", (1, 1), "across from, opposite of it"),
+    "against": ConditionForm("relation", (1, 1), "against, touching it"),
+    "end": ConditionForm("relation", (1, 1), "at the end, foot or head of it"),
+    "along": ConditionForm("relation", (1, 1), "on the same wall or side of the room as it"),
+    "facing": ConditionForm("relation", (1, 1), "turned towards it"),
+    "between": ConditionForm("relation", (1, 2), "between two things, or those of one kind"),
+    "corner": ConditionForm("relation", (0, 1), "in a corner of the room, or of the thing"),
+    "center": ConditionForm("relation", (0, 1), "in the middle of the room, or of the thing"),
+    "closest": ConditionForm("rank", (0, 1), "closest, nearest, closer; without a thing: to the viewer", number="may"),
+    "farthest": ConditionForm(
+        "rank", (0, 1), "farthest, far from, away from; without a thing: from the viewer", number="may"
+    ),
+    "leftmost": ConditionForm("rank", (0, 0), "the left one, on the left, first from the left", number="may"),
+    "rightmost": ConditionForm("rank", (0, 0), "the right one, on the right, second from the right: 2", number="may"),
+    "frontmost": ConditionForm("rank", (0, 0), "the front one", number="may"),
+    "backmost": ConditionForm("rank", (0, 0), "the back one, at the back", number="may"),
+    "middle": ConditionForm("rank", (0, 0), "the middle one of several"),
+    "nth": ConditionForm("rank", (0, 0), "the first, second, third with no side named", number="must"),
+    "largest": ConditionForm("rank", (0, 0), "largest, larger, biggest", number="may"),
+    "smallest": ConditionForm("rank", (0, 0), "smallest, smaller", number="may"),
+    "tallest": ConditionForm("rank", (0, 0), "tallest, taller", number="may"),
+    "shortest": ConditionForm("rank", (0, 0), "shortest, shorter", number="may"),
+    "longest": ConditionForm("rank", (0, 0), "longest, longer, widest, wider", number="may"),
+    "highest": ConditionForm("rank", (0, 0), "highest, upper, top", number="may"),
+    "lowest": ConditionForm("rank", (0, 0), "lowest, lower, bottom", number="may"),
+    "looking": ConditionForm("view", (1, 1), "seen by one who faces it: facing, looking at, from the foot of it"),
+    "from": ConditionForm("view", (1, 1), "seen from it: standing at it, entering by it, lying on it"),
+    "back": ConditionForm("view", (1, 1), "seen with the back to it"),
+    "room": ConditionForm("place", (1, 1), "in a room or area: bathroom, work area, second bedroom"),
+    "floor": ConditionForm("place", (0, 0), "on a floor of the building, as said: upstairs, second floor", True),
+    "for": ConditionForm("purpose", (0, 0), "what the thing is used for, as said: sit on", True),
 }
 RANKS = tuple(name for name, form in CONDITIONS.items() if form.kind == "rank")
 
 
-class _Part(BaseModel):
+class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
 
-class Condition(_Part):
-    """One thing that is said of a thing. `number`: 2 for "second from the left", 3 for "one of the three"; 0 unsaid."""
+class Condition(_Model):
+    """One condition on a thing. `number`: 2 in "second from the left", 3 in "one of the three"; 0 when not given."""
 
     name: str
     things: tuple[Thing, ...] = ()
@@ -110,36 +114,36 @@ class Condition(_Part):
 
     @property
     def kind(self) -> Kind:
-        """What sort of condition it is."""
+        """The kind of condition, by which it is scored."""
         return CONDITIONS[self.name].kind
 
 
-class Thing(_Part):
-    """A noun as said ("" or ANYTHING: whatever fits; SAME_KIND: of the target's kind) and what is said of it."""
+class Thing(_Model):
+    """A noun as said and its conditions. "" or ANYTHING: any kind of thing; SAME_KIND: the target's kind."""
 
     noun: str = ""
     conditions: tuple[Condition, ...] = ()
 
-    def said(self, name: str) -> Iterator[Condition]:
-        """The conditions of one name, in order."""
+    def conditions_named(self, name: str) -> Iterator[Condition]:
+        """The conditions with this name, in order."""
         return (condition for condition in self.conditions if condition.name == name)
 
 
-class Program(_Part):
-    """A request: the thing to find. Views, room, floor and purpose are conditions of the target."""
+class Program(_Model):
+    """A request: the thing to find. Viewpoint, room, floor and purpose are conditions of the target."""
 
     target: Thing
 
 
-def normal(thing: Thing) -> Thing:
-    """The same request in one form: nouns singular, conditions in order of their text, ranks numbered from 1.
+def normalized(thing: Thing) -> Thing:
+    """The program in normal form: nouns singular, conditions sorted, ranks numbered from 1.
 
-    Two readings of a request are the same when their normal forms are equal.
+    Two programs mean the same when their normal forms are equal.
     """
     conditions = []
     for condition in thing.conditions:
         number = condition.number or int(CONDITIONS[condition.name].number == "may")
-        things = tuple(normal(inner) for inner in condition.things)
+        things = tuple(normalized(inner) for inner in condition.things)
         if condition.name == "between":
             things = tuple(sorted(things, key=repr))
         words = normal_form(condition.words).replace("grey", "gray")

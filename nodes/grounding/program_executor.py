@@ -1,6 +1,7 @@
-"""Rank the targets of a program by names, looks, relations, ranks and views, with the sentences that say why.
+"""Run a program on a scene graph: the target's candidates, ranked, each with the sentences that say why.
 
-Source: paper, "Object Grounding"; METHOD section 10, steps 3 and 4. Departs: geometry in code ranks.
+Source: paper, "Object Grounding". Not as in the paper: geometry computed in code ranks the candidates, not the language
+model.
 """
 
 from __future__ import annotations
@@ -11,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes, Layout, layout_of
-from placegraph.nodes.grounding.conditions import NOT_THINGS, Conditions, says
-from placegraph.nodes.grounding.name_matching import Fit, Names
+from placegraph.nodes.grounding.conditions import SURFACE_NAMES, ConditionScorer, names_a_kind
+from placegraph.nodes.grounding.name_matching import NameMatch, NameMatcher
 from placegraph.nodes.grounding.program import SAME_KIND, Program, Thing
 from placegraph.nodes.grounding.ranking import TIE, Candidate, Ranking
-from placegraph.nodes.grounding.scoring import Weighing
-from placegraph.nodes.grounding.search_scope import Scope, narrow, places_called
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.scoring import ScoredCandidates
+from placegraph.nodes.grounding.search_scope import SearchScope, match_places, narrow_scope
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
@@ -26,7 +27,7 @@ MAX_LISTED = 50  # departs: candidates told with evidence; no request may ask fo
 FAR_BETTER = 2.0  # departs: what holds by a hair does not go before what is so much better but for one condition
 FACED = 0.9  # departs: anchors of a view that fit nearly as well as the best vote on where it looks
 BESIDE_M, STOREY_M = 1.5, 2.0  # departs: who stands so near to one of several doors means that one
-DOORS = frozenset(
+ENTRANCE_WORDS = frozenset(
     ("enter", "entering", "entered", "the", "room", "into", "through", "stepping", "walks", "inside",
      "entrance", "enters", "entry", "exit", "walk", "walking", "come", "coming", "in", "doorway",
      "walked", "entered", "step", "outside", "entryway")
@@ -34,124 +35,132 @@ DOORS = frozenset(
 
 
 @dataclass(frozen=True)
-class Viewpoint:
-    """From where left, right, front and behind are meant: (3,) metres, world frame, and whose place that is."""
+class ReportedViewpoint:
+    """The point (3,) in metres, world frame, from which left, right, front and behind were judged, and what it is."""
 
     source: str  # "asker", "room centre", "place before window O4", "door O2"
     xyz_world: F64
 
 
-class Grounder:
-    """Ranks targets in one graph, seen from one place."""
+class ProgramExecutor:
+    """Executes programs on one graph for one asker."""
 
     def __init__(
         self,
         graph: SceneGraph,
-        names: Names,
+        names: NameMatcher,
         asker_world: F64,
         heading_rad: float = np.nan,
         layout: Layout | None = None,
     ) -> None:
-        """asker_world: (3,) metres, world frame, heading_rad about z from +x; NaN when they are not given.
+        """asker_world: (3,) metres, world frame; heading_rad: about z from +x; NaN when not given.
 
-        layout: that of the graph, where it is known already.
+        layout: the graph's, when it is already computed.
         """
         self.graph, self.names = graph, names
         self.asker_world = asker_world
         self.layout = layout or layout_of(graph)
-        self.views = Views(self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw)
+        self.viewpoints = ViewpointSelector(
+            self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw
+        )
 
-    def viewpoint(self, node: Node) -> Viewpoint:
-        """From where a node is seen: the place that the request names, the asker's, else the centre of its room."""
-        view = self.views.named
+    def viewpoint(self, node: Node) -> ReportedViewpoint:
+        """From where a node is seen: what the request names, else the asker, else the centre of the node's room."""
+        viewpoint = self.viewpoints.explicit
         height = float(node.center[2])
-        if view is self.views.asker and view is not None:
-            return Viewpoint("asker", self.asker_world)
-        if view is not None:
-            return Viewpoint(view.source, self.layout.to_world(np.array([*view.eye, height])))
+        if viewpoint is self.viewpoints.asker and viewpoint is not None:
+            return ReportedViewpoint("asker", self.asker_world)
+        if viewpoint is not None:
+            return ReportedViewpoint(viewpoint.source, self.layout.to_world(np.array([*viewpoint.eye, height])))
         room = self.graph.room_of(node.id)
         center = (self.graph.nodes[room] if room else self.graph.building).center
-        return Viewpoint("room centre", center)
+        return ReportedViewpoint("room centre", center)
 
-    def scope(self, target: Thing) -> Scope:
-        """Where the target's place words say to look."""
-        everywhere = Scope(self.graph.layer("object"), [])
-        return narrow(self.graph, target, self.names, self._conditions(everywhere, Ranking()).rank_places)
+    def scope(self, target: Thing) -> SearchScope:
+        """The part of the graph that the target's place words restrict the search to."""
+        everywhere = SearchScope(self.graph.layer("object"), [])
+        return narrow_scope(self.graph, target, self.names, self._conditions(everywhere, Ranking()).rank_places)
 
-    def rank(self, program: Program, scope: Scope | None = None) -> Ranking:
-        """Candidates of the scope for the program's target; empty when nothing is called so, or nothing fits."""
+    def rank(self, program: Program, scope: SearchScope | None = None) -> Ranking:
+        """Rank the candidates for the program's target; empty when nothing has its name or nothing fits."""
         scope = scope or self.scope(program.target)
         ranking = Ranking(notes=list(scope.notes), sure=scope.sure)
-        conditions, thing = self._conditions(scope, ranking), scope.thing
-        self._look_from(thing, conditions)
-        fits = self._targets(thing.noun, scope, ranking)
-        if fits:
-            self._list(ranking, thing, conditions.weigh(thing, conditions.boxes(fits), fits, thing), fits)
+        conditions, target = self._conditions(scope, ranking), scope.thing
+        self._choose_viewpoint(target, conditions)
+        matches = self._match_targets(target.noun, scope, ranking)
+        if matches:
+            scored = conditions.score(target, conditions.boxes(matches), matches, target)
+            self._fill_ranking(ranking, target, scored, matches)
         return ranking
 
-    def _beside_asker(self, things: Boxes) -> Boxes:
-        """Of several things that one may stand at, those that the asker does stand at, if any."""
-        away = np.linalg.norm(things.center[:, :2] - self.asker_world[:2], axis=1)
-        level = np.abs(things.low[:, 2] - self.asker_world[2]) <= STOREY_M
-        here = np.flatnonzero((away <= BESIDE_M) & level)
-        return things.take(here) if len(here) else things
+    def _nearest_to_asker(self, things: Boxes) -> Boxes:
+        """Of several things to stand at, those that the asker stands at; all of them when there is none such."""
+        distances_m = np.linalg.norm(things.center[:, :2] - self.asker_world[:2], axis=1)
+        same_storey = np.abs(things.low[:, 2] - self.asker_world[2]) <= STOREY_M
+        rows = np.flatnonzero((distances_m <= BESIDE_M) & same_storey)
+        return things.take(rows) if len(rows) else things
 
-    def _conditions(self, scope: Scope, ranking: Ranking) -> Conditions:
-        return Conditions(self.graph, self.names, self.layout, self.views, scope, ranking)
+    def _conditions(self, scope: SearchScope, ranking: Ranking) -> ConditionScorer:
+        return ConditionScorer(self.graph, self.names, self.layout, self.viewpoints, scope, ranking)
 
     @staticmethod
-    def _list(ranking: Ranking, thing: Thing, weighing: Weighing, fits: Sequence[Fit]) -> None:
-        """Put the best into the ranking, those that hold before the others."""
-        scores = weighing.scores
-        keys = [(not weighing.holds[i], -scores[i], id_key(fits[i].node.id)) for i in range(len(fits))]
-        listed = sorted(range(len(fits)), key=keys.__getitem__)
+    def _fill_ranking(ranking: Ranking, target: Thing, scored: ScoredCandidates, matches: Sequence[NameMatch]) -> None:
+        """Put the best candidates into the ranking, those that hold before the others."""
+        scores = scored.scores
+        keys = [(not scored.holds[i], -scores[i], id_key(matches[i].node.id)) for i in range(len(matches))]
+        listed = sorted(range(len(matches)), key=keys.__getitem__)
         if scores.max() > FAR_BETTER * scores[listed[0]]:
             listed = sorted(listed, key=lambda i: (-scores[i], keys[i]))
         for i in listed[:MAX_LISTED]:
-            called = [f"{weighing.boxes.labels[i]} is called {fits[i].tag}"] if says(thing.noun) else []
-            evidence = [*called, *weighing.evidence(i)]
-            ranking.candidates.append(Candidate(fits[i].node, float(scores[i]), evidence, bool(weighing.holds[i])))
+            naming = [f"{scored.boxes.labels[i]} is called {matches[i].tag}"] if names_a_kind(target.noun) else []
+            evidence = [*naming, *scored.evidence(i)]
+            ranking.candidates.append(Candidate(matches[i].node, float(scores[i]), evidence, bool(scored.holds[i])))
         best = ranking.candidates[0]
         ranking.sure &= best.holds
-        if says(thing.noun):
+        if names_a_kind(target.noun):
             return
-        related = any(one.kind == "relation" and not one.negated for one in thing.conditions)
-        if not best.holds and related and thing.noun != SAME_KIND:
-            # "what is under the bed?": of anything, only what is there is an answer
+        has_relation = any(c.kind == "relation" and not c.negated for c in target.conditions)
+        if not best.holds and has_relation and target.noun != SAME_KIND:
+            # "what is under the bed?": without a name, only what really is there is an answer
             ranking.notes += best.evidence
             ranking.candidates.clear()
-        elif len(fits) > 1 and scores.max() - scores.min() < TIE:
+        elif len(matches) > 1 and scores.max() - scores.min() < TIE:
             ranking.note("nothing that is said tells one thing from another")
             ranking.candidates.clear()
 
-    def _targets(self, noun: str, scope: Scope, ranking: Ranking) -> list[Fit]:
-        """What the noun names in the scope: objects, or places where those bear the name better."""
-        if not says(noun):
-            return [Fit(node, 1.0, node.name) for node in scope.objects if node.name not in NOT_THINGS]
-        objects = self.names.called(noun, scope.objects)
-        places = places_called(noun, scope.places, self.names)
-        best = max((fit.score for fit in objects), default=0.0)
-        if any(fit.score > best for fit in places):
+    def _match_targets(self, noun: str, scope: SearchScope, ranking: Ranking) -> list[NameMatch]:
+        """What the noun names in the scope: objects, or places when those have the better-fitting name."""
+        if not names_a_kind(noun):
+            return [NameMatch(node, 1.0, node.name) for node in scope.objects if node.name not in SURFACE_NAMES]
+        objects = self.names.matches(noun, scope.objects)
+        places = match_places(noun, scope.places, self.names)
+        best = max((match.score for match in objects), default=0.0)
+        if any(match.score > best for match in places):
             return places
         if not objects and not self.names.is_known(noun, self.graph.layer("object")):
-            objects = self.names.fair(noun, scope.objects)
+            objects = self.names.nearest_matches(noun, scope.objects)
             if objects:
                 ranking.note(f"nothing is called {noun}; {objects[0].tag} is the nearest name")
         return objects
 
-    def _look_from(self, thing: Thing, conditions: Conditions) -> None:
-        """Find the view that the request names."""
-        self.views.said = None
-        for condition in (one for one in thing.conditions if one.kind == "view"):
-            inner = condition.things[0]
-            said = set(normal_form(inner.noun).split())
-            if said and said <= DOORS:
-                inner = inner.model_copy(update={"noun": "door"})
-            found = conditions.anchors(inner, thing, 1)
-            if found is None:
-                conditions.ranking.note(f"nothing in the map is called {inner.noun}, so nobody looks from there")
+    def _choose_viewpoint(self, target: Thing, conditions: ConditionScorer) -> None:
+        """Set the viewpoint that the request names ("standing at the door", "facing the window")."""
+        self.viewpoints.requested = None
+        choices = {
+            "from": self.viewpoints.at,
+            "back": self.viewpoints.with_back_to,
+            "looking": self.viewpoints.in_front_of_most,
+        }
+        for condition in target.conditions:
+            if condition.kind != "view":
                 continue
-            best = self._beside_asker(found.best(level=FACED))
-            makers = {"from": self.views.at, "back": self.views.away, "looking": self.views.facing_most}
-            self.views.said = makers[condition.name](best)
-            conditions.forget()  # what was found before was seen from elsewhere
+            thing = condition.things[0]
+            words = set(normal_form(thing.noun).split())
+            if words and words <= ENTRANCE_WORDS:
+                thing = thing.model_copy(update={"noun": "door"})
+            anchors = conditions.anchors(thing, target, 1)
+            if anchors is None:
+                conditions.ranking.note(f"nothing in the map is called {thing.noun}, so nobody looks from there")
+                continue
+            self.viewpoints.requested = choices[condition.name](self._nearest_to_asker(anchors.best(min_weight=FACED)))
+            conditions.clear_anchors()  # they were scored from another viewpoint

@@ -1,10 +1,10 @@
-"""The short text form of a program that the language model writes: read, written, and the grammar that allows no other.
+"""The short text form of programs that the language model writes: parsing, formatting, and the grammar for llama.cpp.
 
     pillow; is blue; on (bed; leftmost); not near (lamp); closest 2 (window); floor (upstairs)
 
-A thing is its noun and its conditions with `;` between them; things of one condition have `,` between them. Nouns and
-words are copied from the request, so the grammar is made for each request from its own words.
-Departs: JSON says the same in three times the tokens, and each costs 10 ms and some of a small model's attention.
+A thing is a noun and its conditions, separated by `;`; the things of one condition are separated by `,`. Nouns and
+words are copied from the request, so the grammar is made anew for each request. Not JSON, which takes three times the
+tokens, 10 ms each.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from placegraph.nodes.grounding.program import (
     MAX_DEPTH,
     SAME_KIND,
     Condition,
-    Form,
+    ConditionForm,
     Thing,
 )
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.word_forms import tokens
 
 LEXEME = re.compile(r"\s*([;,()]|[a-z0-9'-]+)")
-# No noun starts with these; without them the grammar's choices are half as many.
+# No noun starts with one of these words; leaving them out halves the grammar's choices.
 NEVER_FIRST = frozenset(
     ("the", "a", "an", "is", "are", "was", "be", "of", "to", "and", "or", "in", "on", "at", "it", "its", "this", "that",
      "these", "those", "which", "who", "with", "by", "for", "from", "as", "your", "you", "i", "my", "me", "we", "our",
@@ -36,46 +36,46 @@ NEVER_FIRST = frozenset(
 )  # fmt: skip
 
 
-def read(text: str) -> Thing:
-    """A program's text as a thing; raises QueryError saying what was expected where."""
-    lexemes, at = [], 0
+def parse_program(text: str) -> Thing:
+    """Parse a program's text. Raises QueryError saying what was expected where."""
+    lexemes, position = [], 0
     text = text.strip()
-    while at < len(text):
-        match = LEXEME.match(text, at)
+    while position < len(text):
+        match = LEXEME.match(text, position)
         if match is None:
-            raise QueryError(f"program {text!r}: {text[at:].lstrip()[0]!r} has no place in it")
+            raise QueryError(f"program {text!r}: {text[position:].lstrip()[0]!r} has no place in it")
         lexemes.append(match[1])
-        at = match.end()
-    reader = _Reader(text, lexemes)
-    thing = reader.thing(1)
-    if reader.at < len(lexemes):
-        raise reader.error("the end")
+        position = match.end()
+    parser = _Parser(text, lexemes)
+    thing = parser.thing(1)
+    if parser.position < len(lexemes):
+        raise parser.error("the end")
     return thing
 
 
-class _Reader:
+class _Parser:
     """Recursive descent over the lexemes of one program."""
 
     def __init__(self, text: str, lexemes: Sequence[str]) -> None:
-        self.text, self.lexemes, self.at = text, lexemes, 0
+        self.text, self.lexemes, self.position = text, lexemes, 0
 
     def error(self, expected: str) -> QueryError:
-        found = " ".join(self.lexemes[self.at : self.at + 3]) or "the end"
-        return QueryError(f"program {self.text!r}: expected {expected}, found {found!r}")
+        next_lexemes = " ".join(self.lexemes[self.position : self.position + 3]) or "the end"
+        return QueryError(f"program {self.text!r}: expected {expected}, found {next_lexemes!r}")
 
     def accept(self, mark: str) -> bool:
-        if self.lexemes[self.at : self.at + 1] != [mark]:
+        if self.lexemes[self.position : self.position + 1] != [mark]:
             return False
-        self.at += 1
+        self.position += 1
         return True
 
     def words(self, expected: str) -> str:
-        start = self.at
-        while self.at < len(self.lexemes) and self.lexemes[self.at] not in ";,()":
-            self.at += 1
-        if start == self.at:
+        start = self.position
+        while self.position < len(self.lexemes) and self.lexemes[self.position] not in ";,()":
+            self.position += 1
+        if start == self.position:
             raise self.error(expected)
-        return " ".join(self.lexemes[start : self.at])
+        return " ".join(self.lexemes[start : self.position])
 
     def thing(self, depth: int) -> Thing:
         if depth > MAX_DEPTH:
@@ -87,20 +87,24 @@ class _Reader:
 
     def condition(self, depth: int) -> Condition:
         negated = self.accept("not")
-        name = self.lexemes[self.at] if self.at < len(self.lexemes) else ""
+        name = self.lexemes[self.position] if self.position < len(self.lexemes) else ""
         form = CONDITIONS.get(name)
         if form is None:
             raise self.error("a condition")
-        self.at += 1
-        number, said, things = 0, "", []
+        self.position += 1
+        number, words, things = 0, "", []
         if form.words and name == "is":
-            said = self.words("how it looks")
-        if form.number != "never" and self.lexemes[self.at : self.at + 1] and self.lexemes[self.at].isdigit():
-            number = int(self.lexemes[self.at])
-            self.at += 1
+            words = self.words("how it looks")
+        if (
+            form.number != "never"
+            and self.lexemes[self.position : self.position + 1]
+            and self.lexemes[self.position].isdigit()
+        ):
+            number = int(self.lexemes[self.position])
+            self.position += 1
         if self.accept("("):
             if form.words:
-                said = self.words("words")
+                words = self.words("words")
             else:
                 things.append(self.thing(depth + 1))
                 while self.accept(","):
@@ -108,13 +112,13 @@ class _Reader:
             if not self.accept(")"):
                 raise self.error(")")
         try:
-            return Condition(name=name, things=tuple(things), words=said, number=number, negated=negated)
+            return Condition(name=name, things=tuple(things), words=words, number=number, negated=negated)
         except ValidationError as error:
             raise QueryError(f"program {self.text!r}: {error.errors()[0]['msg']}") from None
 
 
-def write(thing: Thing) -> str:
-    """A thing as a program's text."""
+def format_program(thing: Thing) -> str:
+    """A thing as program text."""
     return "; ".join([thing.noun or ANYTHING, *map(_condition, thing.conditions)])
 
 
@@ -128,12 +132,12 @@ def _condition(condition: Condition) -> str:
     if condition.number and not (condition.number == 1 and CONDITIONS[condition.name].number == "may"):
         parts.append(str(condition.number))
     if condition.things:
-        parts.append(f"({', '.join(map(write, condition.things))})")
+        parts.append(f"({', '.join(map(format_program, condition.things))})")
     return " ".join(parts)
 
 
-def grammar(text: str) -> str:
-    """GBNF of all programs of a request: " ", a thing, a newline. Raises QueryError when the request has no word."""
+def program_grammar(text: str) -> str:
+    """GBNF grammar of all programs of a request: " ", a thing, a newline. Raises QueryError for a wordless text."""
     words = tokens(text)
     spans = [f's{i} ::= "{word}"' + _onward(words, i) for i, word in enumerate(words) if word[0].isalnum()]
     if not spans:
@@ -156,23 +160,23 @@ def grammar(text: str) -> str:
 
 
 def _onward(words: Sequence[str], i: int) -> str:
-    """The rest of a span: what is between two marks may be copied as far as one likes."""
+    """The optional rest of a span: words may be copied up to the next punctuation mark."""
     following = i + 1 < len(words) and words[i + 1][0].isalnum()
     return f' (" " s{i + 1})?' if following else ""
 
 
-def _rule(name: str, form: Form, depth: int) -> str:
-    """GBNF of one condition at a depth; "" where its things would lie too deep."""
+def _rule(name: str, form: ConditionForm, depth: int) -> str:
+    """GBNF of one condition at a depth; "" when its things would exceed MAX_DEPTH."""
     if name == "is":
         return '"is " said'
     if form.words:
         return f'"{name} (" said ")"'
     number = {"never": "", "may": '(" " number)?', "must": '" " number'}[form.number]
-    least, most = form.things
-    inner = f'" (" t{depth + 1}' + (f' (", " t{depth + 1})?' if most == 2 else "") + ' ")"'
-    if most and depth == MAX_DEPTH:
-        return "" if least else f'"{name}" {number}'
-    things = "" if not most else inner if least else f"({inner})?"
+    min_things, max_things = form.things
+    inner = f'" (" t{depth + 1}' + (f' (", " t{depth + 1})?' if max_things == 2 else "") + ' ")"'
+    if max_things and depth == MAX_DEPTH:
+        return "" if min_things else f'"{name}" {number}'
+    things = "" if not max_things else inner if min_things else f"({inner})?"
     return " ".join(part for part in (f'"{name}"', number, things) if part)
 
 

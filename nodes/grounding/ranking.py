@@ -1,4 +1,4 @@
-"""What ranking gives: candidates with evidence, and whether the evidence alone decides."""
+"""The result of executing a program: ranked candidates with evidence, notes, and whether the evidence decides."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ TIE = 0.03  # departs: scores that differ by less do not tell two objects apart
 
 @dataclass
 class Candidate:
-    """One target with its score 0..1, its evidence, and whether every condition holds."""
+    """One candidate with its score 0..1, its evidence sentences, and whether every condition holds."""
 
     node: Node
     score: float
@@ -21,14 +21,14 @@ class Candidate:
 
 @dataclass
 class Ranking:
-    """The candidates, best first, what else there is to say, and whether the evidence alone decides."""
+    """The candidates, best first; notes on what could not be followed; sure: the evidence alone decides."""
 
     candidates: list[Candidate] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     sure: bool = True
 
     def tied(self) -> list[Candidate]:
-        """The candidates that the evidence does not tell from the best one (that one included)."""
+        """The best candidate and those that the evidence cannot tell from it."""
         return [
             candidate
             for candidate in self.candidates
@@ -36,7 +36,7 @@ class Ranking:
         ]
 
     def note(self, text: str) -> None:
-        """Say something once, and that it leaves doubt."""
+        """Add a note once; the answer is not sure any more."""
         self.sure = False
         if text not in self.notes:
             self.notes.append(text)

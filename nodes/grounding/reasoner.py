@@ -1,6 +1,7 @@
-"""Question to answer: read into a program, executed on the graph, and the reply's fields.
+"""Question to answer: parse the question into a program, execute it on the graph, build the reply.
 
-Source: paper, "Deductive Hierarchical Reasoning Algorithm"; METHOD section 10.
+Source: paper, "Deductive Hierarchical Reasoning Algorithm". Not as in the paper: by default one call parses the
+question; the paper's flow, a call per layer, is the mode "deductive".
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ import numpy as np
 from placegraph.nodes.grounding.answer_fields import found, not_in_map
 from placegraph.nodes.grounding.box_arrays import Layout, layout_of
 from placegraph.nodes.grounding.deductive_reasoning import deduce
-from placegraph.nodes.grounding.llm_parser import read_by_examples, read_request
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.llm_parser import parse_by_examples, parse_by_model
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.program import Program, Thing
-from placegraph.nodes.grounding.program_executor import Grounder
-from placegraph.nodes.grounding.program_syntax import write
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
+from placegraph.nodes.grounding.program_syntax import format_program
 from placegraph.nodes.grounding.ranking import Ranking
-from placegraph.nodes.grounding.rule_parser import check_text, draft
-from placegraph.nodes.grounding.search_scope import Scope, places_called
+from placegraph.nodes.grounding.rule_parser import check_text, parse_by_rules
+from placegraph.nodes.grounding.search_scope import SearchScope, match_places
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.language.prompts import fill_prompt
@@ -37,122 +38,126 @@ MIN_CONFIDENCE = 0.05
 
 
 @dataclass(frozen=True)
-class Reasoned:
-    """What one mode made of a question: the program it was read into (None: it has none) and what that gives."""
+class ModeResult:
+    """What one mode made of a question: its program (None in mode "deductive") and the ranking."""
 
     program: Program | None
     ranking: Ranking
-    grounder: Grounder
+    executor: ProgramExecutor
     sure: bool
     reader: str = ""  # "model" or "rules"
     confidence: float | None = None  # of the model's reading, 0..1
-    kept: dict[str, Any] | None = None  # mode "deductive": what was kept of each level
+    levels: dict[str, Any] | None = None  # mode "deductive": the ids kept of each level
 
 
 class Reasoner:
-    """Answers questions about one graph at a time; asks the model only what the words and the map leave open."""
+    """Answers questions about one graph at a time."""
 
-    def __init__(self, names: Names, model: LanguageModel, place_types: Sequence[str], *, use_model: bool) -> None:
-        """place_types: names that stand for a kind of place, also where the map has none such."""
+    def __init__(
+        self, names: NameMatcher, model: LanguageModel, place_types: Sequence[str], *, use_model: bool
+    ) -> None:
+        """place_types: names of kinds of places; they count as places even when the map has none of that kind."""
         self._names = names
         self._model = model
         self._place_types = frozenset(map(normal_form, place_types))
         self._use_model = use_model
         self._layout: tuple[SceneGraph, Layout] | None = None
-        self._modes: dict[str, Callable[[SceneGraph, Question], Reasoned]] = {
-            "program": self._by_model,
-            "rules": self._by_rules,
-            "deductive": self._by_levels,
+        self._modes: dict[str, Callable[[SceneGraph, Question], ModeResult]] = {
+            "program": self._answer_by_model,
+            "rules": self._answer_by_rules,
+            "deductive": self._answer_deductive,
         }
 
     def answer(self, graph: SceneGraph, revision: int, question: Question) -> dict[str, Any]:
-        """The fields of the answer, all but those of an error. Raises QueryError when the question is not usable."""
+        """The answer's fields. Raises QueryError for a question that cannot be answered at all."""
         _check(question)
-        before = self._model.calls
-        reasoned = self._modes[question.mode](graph, question)
-        return self._fields(graph, revision, question, reasoned, before)
+        calls_before = self._model.calls
+        result = self._modes[question.mode](graph, question)
+        return self._build_fields(graph, revision, question, result, calls_before)
 
     def answer_program(self, graph: SceneGraph, revision: int, question: Question, program: Program) -> dict[str, Any]:
-        """The answer to a question whose program is given (an oracle's). Raises QueryError."""
-        before = self._model.calls
-        return self._fields(graph, revision, question, self._executed(graph, question, program, ""), before)
+        """The answer to a question whose program is given. Raises QueryError."""
+        calls_before = self._model.calls
+        return self._build_fields(graph, revision, question, self._execute(graph, question, program, ""), calls_before)
 
-    def _fields(
-        self, graph: SceneGraph, revision: int, question: Question, reasoned: Reasoned, calls: int
+    def _build_fields(
+        self, graph: SceneGraph, revision: int, question: Question, result: ModeResult, calls_before: int
     ) -> dict[str, Any]:
-        program, ranking = reasoned.program, reasoned.ranking
-        parse = reasoned.kept
+        program, ranking = result.program, result.ranking
+        parse = result.levels
         if program:
             parse = {
-                "text": write(program.target),
+                "text": format_program(program.target),
                 "program": program.model_dump(mode="json"),
-                "confidence": reasoned.confidence,
-                "reader": reasoned.reader,
+                "confidence": result.confidence,
+                "reader": result.reader,
             }
         common = {
             "question": question.text,
             "question_id": question.question_id,
             "parse": parse,
             "revision": revision,
-            "llm_calls": self._model.calls - calls,
+            "llm_calls": self._model.calls - calls_before,
         }
         if not ranking.candidates:
             target = program.target if program else Thing()
-            return common | not_in_map(graph, target, ranking, reasoned.grounder, self._names)
-        return common | found(graph, ranking, reasoned.grounder, question.k, reasoned.sure)
+            return common | not_in_map(graph, target, ranking, result.executor, self._names)
+        return common | found(graph, ranking, result.executor, question.k, result.sure)
 
-    def _by_model(self, graph: SceneGraph, question: Question) -> Reasoned:
-        if not self._use_model:  # asked for by the configuration, and said in the parse
-            return self._by_rules(graph, question)
+    def _answer_by_model(self, graph: SceneGraph, question: Question) -> ModeResult:
+        if not self._use_model:  # the reply's `parse` says that the rules read it
+            return self._answer_by_rules(graph, question)
         check_text(question.text)
-        read = read_request if self._model.adapter_path else read_by_examples
-        reading = read(self._model, question.text)
-        confidence = round(float(reading.confidence), 4)
-        if reading.thing is not None and confidence >= MIN_CONFIDENCE:
-            return self._executed(graph, question, Program(target=reading.thing), "model", confidence)
-        return self._doubtful(graph, question, reading.thing, confidence)
+        parse = parse_by_model if self._model.adapter_path else parse_by_examples
+        parsed = parse(self._model, question.text)
+        confidence = round(float(parsed.confidence), 4)
+        if parsed.thing is not None and confidence >= MIN_CONFIDENCE:
+            return self._execute(graph, question, Program(target=parsed.thing), "model", confidence)
+        return self._answer_uncertain(graph, question, parsed.thing, confidence)
 
-    def _doubtful(self, graph: SceneGraph, question: Question, thing: Thing | None, confidence: float) -> Reasoned:
-        """The deductive mode's answer; where it gives none what was read (None: nothing) is followed all the same."""
-        doubt = f"the reading of the request is doubtful (confidence {confidence:.2f})"
-        reasoned: Reasoned | None = None
+    def _answer_uncertain(
+        self, graph: SceneGraph, question: Question, thing: Thing | None, confidence: float
+    ) -> ModeResult:
+        """The deductive mode's answer; when it has none, that of the doubtful program, or of the rules without one."""
+        note = f"the reading of the request is doubtful (confidence {confidence:.2f})"
+        result: ModeResult | None = None
         if _names_something(graph, question.text):
             try:
-                reasoned = self._by_levels(graph, question)
-                doubt += ", so it was asked level by level"
+                result = self._answer_deductive(graph, question)
+                note += ", so it was asked level by level"
             except QueryError as error:
-                doubt += f", and level by level there is no answer: {error}"
-        if reasoned is None and thing is not None:
-            reasoned = self._executed(graph, question, Program(target=thing), "model", confidence)
-        reasoned = reasoned or self._by_rules(graph, question)
-        reasoned.ranking.notes.insert(0, doubt)
-        return replace(reasoned, sure=False)
+                note += f", and level by level there is no answer: {error}"
+        if result is None and thing is not None:
+            result = self._execute(graph, question, Program(target=thing), "model", confidence)
+        result = result or self._answer_by_rules(graph, question)
+        result.ranking.notes.insert(0, note)
+        return replace(result, sure=False)
 
-    def _by_levels(self, graph: SceneGraph, question: Question) -> Reasoned:
+    def _answer_deductive(self, graph: SceneGraph, question: Question) -> ModeResult:
         if not self._use_model:
             raise QueryError("mode 'deductive' needs the language model, which use_model = false switches off")
         asker = np.asarray(question.viewpoint_world, float)
-        grounder = Grounder(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
-        kept, ranking = deduce(self._model, grounder, question.text)
-        return Reasoned(None, ranking, grounder, ranking.sure, "levels", kept=asdict(kept))
+        executor = ProgramExecutor(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
+        levels, ranking = deduce(self._model, executor, question.text)
+        return ModeResult(None, ranking, executor, ranking.sure, "levels", levels=asdict(levels))
 
-    def _by_rules(self, graph: SceneGraph, question: Question) -> Reasoned:
-        return self._executed(graph, question, self.parse(graph, question.text), "rules")
+    def _answer_by_rules(self, graph: SceneGraph, question: Question) -> ModeResult:
+        return self._execute(graph, question, self.parse(graph, question.text), "rules")
 
-    def _executed(
+    def _execute(
         self, graph: SceneGraph, question: Question, program: Program, reader: str, confidence: float | None = None
-    ) -> Reasoned:
-        """Run a program on the graph."""
+    ) -> ModeResult:
+        """Execute a program on the graph; a purpose ("something to sit on") is first turned into a noun."""
         asker = np.asarray(question.viewpoint_world, float)
-        grounder = Grounder(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
-        scope = grounder.scope(program.target)
-        if any(program.target.said("for")):
+        executor = ProgramExecutor(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
+        scope = executor.scope(program.target)
+        if any(program.target.conditions_named("for")):
             program = self._by_purpose(program, scope)
-        ranking = grounder.rank(program, scope)
+        ranking = executor.rank(program, scope)
         tied = ranking.tied()
         if len(tied) > 1:  # the lowest id stands first
-            ranking.note(f"{len(tied)} candidates fit equally: {', '.join(one.node.id for one in tied)}")
-        return Reasoned(program, ranking, grounder, ranking.sure, reader, confidence)
+            ranking.note(f"{len(tied)} candidates fit equally: {', '.join(candidate.node.id for candidate in tied)}")
+        return ModeResult(program, ranking, executor, ranking.sure, reader, confidence)
 
     def _layout_of(self, graph: SceneGraph) -> Layout:
         if self._layout is None or self._layout[0] is not graph:
@@ -160,7 +165,7 @@ class Reasoner:
         return self._layout[1]
 
     def parse(self, graph: SceneGraph, text: str) -> Program:
-        """The program of a question in this map, by rules. Raises QueryError."""
+        """Parse a question by rules; which words are places or known names depends on the map. Raises QueryError."""
         objects = graph.layer("object")
         places = [*graph.layer("room"), *graph.layer("location")]
 
@@ -169,21 +174,21 @@ class Reasoner:
                 return False
             if ID_PATTERN.fullmatch(phrase.upper()):
                 return phrase.upper() in graph.nodes and phrase[0] in "RLrl"
-            named = normal_form(phrase) in self._place_types or bool(places_called(phrase, places, self._names))
-            return named and not self._is_tag(phrase, objects)
+            is_named_place = normal_form(phrase) in self._place_types or bool(match_places(phrase, places, self._names))
+            return is_named_place and not self._is_tag(phrase, objects)
 
         def is_known(phrase: str) -> bool:
             return self._names.is_known(phrase, objects) or is_place(phrase)
 
-        return draft(text, is_place, is_known)
+        return parse_by_rules(text, is_place, is_known)
 
     @staticmethod
     def _is_tag(phrase: str, objects: Sequence[Node]) -> bool:
         return any(normal_form(tag.name) == normal_form(phrase) for node in objects for tag in node.tags[:1])
 
-    def _by_purpose(self, program: Program, scope: Scope) -> Program:
-        """Let the model choose which of the names in scope serves the purpose."""
-        purpose = next(program.target.said("for")).words
+    def _by_purpose(self, program: Program, scope: SearchScope) -> Program:
+        """Let the model choose which of the names in scope serves the purpose, and make it the target's noun."""
+        purpose = next(program.target.conditions_named("for")).words
         names = sorted({normal_form(node.tags[0].name) for node in scope.objects if node.tags} - {""})
         scope.sure = False
         if not names:
@@ -191,14 +196,14 @@ class Reasoner:
         if not self._use_model:
             raise QueryError(f"the question names no thing that can be looked for: {purpose}")
         if len(names) > MAX_OPTIONS:
-            near = self._names.nearest(purpose, scope.objects, MAX_OPTIONS)
-            names = sorted({normal_form(name) for name in near})
+            nearest = self._names.nearest_names(purpose, scope.objects, MAX_OPTIONS)
+            names = sorted({normal_form(name) for name in nearest})
         options = [f" {name}" for name in names]
-        opening, said = fill_prompt(__package__, "purpose", purpose=purpose).split("|", 1)
+        prefix, asked_purpose = fill_prompt(__package__, "purpose", purpose=purpose).split("|", 1)
         neutral = fill_prompt(__package__, "purpose", purpose="something").split("|", 1)[1]
-        # minus what each name scores when nothing is said: common words would win otherwise
-        prior = self._model.log_probabilities(opening, neutral, options)
-        scores = self._model.log_probabilities(opening, said, options) - prior
+        # minus each name's score for an empty purpose; otherwise common words would always win
+        prior = self._model.log_probabilities(prefix, neutral, options)
+        scores = self._model.log_probabilities(prefix, asked_purpose, options) - prior
         best = int(np.argmax(scores))
         scope.notes.append(f"the language model chose {names[best]} among {len(names)} names for: {purpose}")
         scope.thing = scope.thing.model_copy(update={"noun": names[best]})
@@ -206,7 +211,7 @@ class Reasoner:
 
 
 def _names_something(graph: SceneGraph, text: str) -> bool:
-    """Whether a word of the request is one of the map's names; where none is, no second reading finds anything."""
+    """Whether a word of the request is a name in the map; otherwise the deductive mode would find nothing either."""
     named = {word for node in graph.nodes.values() for tag in node.tags for word in normal_form(tag.name).split()}
     return any(normal_form(word) in named for word in tokens(text))
 

@@ -1,7 +1,7 @@
-"""Question to program by rules: the pieces of the question put together, without a language model.
+"""Parse a question into a program by rules, without a language model.
 
-Source: METHOD section 10, step 1. Departs: a 135 M model parses one request in five, so the order of the pieces
-(the target precedes its relation, the anchor follows) decides, and of several targets the last one said is meant.
+The order of the phrases decides: the target precedes its relation, the anchor follows it. Of several possible targets
+the last one is meant.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from placegraph.nodes.grounding.phrase_segmentation import WHOLE_MAP, Piece, cut
+from placegraph.nodes.grounding.phrase_segmentation import WHOLE_MAP, Phrase, segment
 from placegraph.nodes.grounding.program import ANYTHING, CONDITIONS, MAX_DEPTH, Condition, Program, Thing
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.word_forms import normal_form, tokens
@@ -27,27 +27,27 @@ PURPOSE_STARTS = (
 
 @dataclass(frozen=True)
 class _Clause:
-    """One relation as it is said; `of` 0: of the target, i: of the anchor of clause i."""
+    """One relation as said. `of`: 0 when it belongs to the target, i when it belongs to the anchor of clause i."""
 
     relation: str
-    anchors: tuple[Piece, ...] = ()
+    anchors: tuple[Phrase, ...] = ()
     of: int = 0
     ordinal: int = 1
     negated: bool = False
 
 
 @dataclass
-class _Build:
-    target: Piece | None = None
+class _ProgramDraft:
+    target: Phrase | None = None
     clauses: list[_Clause] = field(default_factory=list)
     room: str = ""
-    room_with: list[Piece] = field(default_factory=list)  # what tells the room: "the bedroom with the desk"
+    room_with: list[Phrase] = field(default_factory=list)  # "desk" in "the bedroom with the desk"
     outside: bool = False
     floor: str = ""
 
 
 def check_text(text: str) -> None:
-    """Raise QueryError for what is no question: empty, too long, or without an English word."""
+    """Raise QueryError for a text that is empty, too long, or has no word in Latin letters."""
     if not text.strip():
         raise QueryError("the question is empty")
     if len(text) > MAX_CHARS:
@@ -56,45 +56,45 @@ def check_text(text: str) -> None:
         raise QueryError("the question holds no word in Latin letters; questions are read in English")
 
 
-def draft(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> Program:
-    """Put the pieces of a question together.
+def parse_by_rules(text: str, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> Program:
+    """Parse a question.
 
-    is_place: whether a phrase names a room or location; is_known: whether something in the map is called so.
+    is_place: whether a phrase names a room or location; is_known: whether it names anything in the map.
     Raises QueryError when the text is no question or names nothing to look for.
     """
     check_text(text)
-    pieces = [part for piece in cut(text) for part in _split_place(piece, is_place, is_known)]
-    leads = _without_places(pieces, is_place)
+    phrases = [part for phrase in segment(text) for part in _split_place(phrase, is_place, is_known)]
+    candidates = _without_places(phrases, is_place)
     purpose = _purpose(text)
-    options = tuple(dict.fromkeys(piece.text for piece in leads if piece.text))
+    options = tuple(dict.fromkeys(phrase.text for phrase in candidates if phrase.text))
     known = tuple(option for option in options if is_known(option))
     if purpose and not known:
-        program = _assemble(pieces, None, is_place)
-        places = tuple(one for one in program.target.conditions if one.kind == "place")
+        program = _assemble(phrases, None, is_place)
+        places = tuple(condition for condition in program.target.conditions if condition.kind == "place")
         use = Condition(name="for", words=purpose)
         return Program(target=Thing(noun=ANYTHING, conditions=(use, *places)))
     options = known or options
-    by_noun = {option: next(piece for piece in leads if piece.text == option) for option in options}
-    chosen = by_noun[options[-1]] if options else (leads[0] if leads else None)
-    program = _assemble(pieces, chosen, is_place)
+    by_noun = {option: next(phrase for phrase in candidates if phrase.text == option) for option in options}
+    chosen = by_noun[options[-1]] if options else (candidates[0] if candidates else None)
+    program = _assemble(phrases, chosen, is_place)
     if chosen is None and not program.target.conditions:
         raise QueryError("the question names nothing to look for")
     return program
 
 
-def _without_places(pieces: list[Piece], is_place: Callable[[str], bool]) -> list[Piece]:
-    """The things among which the target is; a place beside other things is where to look, not what to look for."""
-    leads = _leading_things(pieces)
-    colored = [piece for piece in leads if not piece.text and piece.color]
-    named = [piece for piece in leads if piece.text]
+def _without_places(phrases: list[Phrase], is_place: Callable[[str], bool]) -> list[Phrase]:
+    """The phrases that may be the target. A place among other things is where to look, not what to look for."""
+    candidates = _target_candidates(phrases)
+    colored = [phrase for phrase in candidates if not phrase.text and phrase.color]
+    named = [phrase for phrase in candidates if phrase.text]
     if colored and len(named) == 1:  # "the mug on the table, the blue one"
         named[0].color = named[0].color or colored[0].color
-    others = [piece for piece in leads if not is_place(piece.text) and piece not in colored]
-    if not others or len(others) == len(leads):
-        return leads
-    for piece in leads:
-        if piece.text and is_place(piece.text):
-            piece.kind = "place"
+    others = [phrase for phrase in candidates if not is_place(phrase.text) and phrase not in colored]
+    if not others or len(others) == len(candidates):
+        return candidates
+    for phrase in candidates:
+        if phrase.text and is_place(phrase.text):
+            phrase.kind = "place"
     return others
 
 
@@ -103,88 +103,91 @@ def _purpose(text: str) -> str:
     return words if any(f" {start} " in f" {words} " for start in PURPOSE_STARTS) else ""
 
 
-def _split_place(piece: Piece, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> list[Piece]:
-    """Take a place name off the front of a noun phrase: "kitchen table" is a table in the kitchen."""
-    words = piece.text.split()
-    if piece.kind != "thing" or len(words) < 2 or is_place(piece.text):
-        return [piece]
+def _split_place(phrase: Phrase, is_place: Callable[[str], bool], is_known: Callable[[str], bool]) -> list[Phrase]:
+    """Split a leading place name off a noun phrase: "kitchen table" is a table in the kitchen."""
+    words = phrase.text.split()
+    if phrase.kind != "thing" or len(words) < 2 or is_place(phrase.text):
+        return [phrase]
     for n in range(len(words) - 1, 0, -1):
         front, noun = " ".join(words[:n]), " ".join(words[n:])
         if is_place(front) and is_known(noun):
-            thing = Piece("thing", noun, piece.color, piece.size, piece.plural, words=words[n:])
-            return [Piece("place", normal_form(front)), thing]
-    return [piece]
+            thing = Phrase("thing", noun, phrase.color, phrase.size, phrase.plural, words=words[n:])
+            return [Phrase("place", normal_form(front)), thing]
+    return [phrase]
 
 
-def _takes(piece: Piece) -> tuple[int, int]:
-    if piece.text in ON_SPOT:
-        return (1, 1) if piece.words[-1:] == ["of"] else (0, 0)
-    return CONDITIONS[piece.text].things
+def _anchor_counts(phrase: Phrase) -> tuple[int, int]:
+    if phrase.text in ON_SPOT:
+        return (1, 1) if phrase.words[-1:] == ["of"] else (0, 0)
+    return CONDITIONS[phrase.text].things
 
 
-def _leading_things(pieces: list[Piece]) -> list[Piece]:
-    """The things that are not the anchor of a relation: those among which the target is."""
-    leads, awaited, later = [], 0, False
-    for i, piece in enumerate(pieces):
-        if piece.kind == "relation":
-            later = _takes(piece) == (0, 1) and not _anchor_follows(pieces, i)
-            awaited = 0 if later else _takes(piece)[1]
-        elif piece.kind == "break" and awaited != 2:
-            awaited = 0
-        elif piece.kind == "thing" and awaited:
-            awaited -= 1
-        elif piece.kind == "thing":
-            leads.append(piece)
-            # "the closest cup to the red chair": the anchor stands behind the noun and "to"
-            awaited = int(later and pieces[i + 1 : i + 2] != [] and pieces[i + 1].kind == "to")
-            later = False
-    return leads
+def _target_candidates(phrases: list[Phrase]) -> list[Phrase]:
+    """The things that are not the anchor of a relation."""
+    candidates, anchors_due, is_deferred = [], 0, False
+    for i, phrase in enumerate(phrases):
+        if phrase.kind == "relation":
+            is_deferred = _anchor_counts(phrase) == (0, 1) and not _anchor_follows(phrases, i)
+            anchors_due = 0 if is_deferred else _anchor_counts(phrase)[1]
+        elif phrase.kind == "break" and anchors_due != 2:
+            anchors_due = 0
+        elif phrase.kind == "thing" and anchors_due:
+            anchors_due -= 1
+        elif phrase.kind == "thing":
+            candidates.append(phrase)
+            # "the closest cup to the red chair": the anchor follows the noun and "to"
+            anchors_due = int(is_deferred and phrases[i + 1 : i + 2] != [] and phrases[i + 1].kind == "to")
+            is_deferred = False
+    return candidates
 
 
-def _anchor_follows(pieces: list[Piece], i: int) -> bool:
+def _anchor_follows(phrases: list[Phrase], i: int) -> bool:
     """Whether the thing after a "closest" is its anchor ("closest to the bed"), not its noun ("the closest chair")."""
-    before = any(piece.kind == "thing" for piece in pieces[:i])
-    after = pieces[i + 1 : i + 2]
+    before = any(phrase.kind == "thing" for phrase in phrases[:i])
+    after = phrases[i + 1 : i + 2]
     return before and bool(after) and after[0].kind in ("thing", "place")
 
 
-def _assemble(pieces: list[Piece], target: Piece | None, is_place: Callable[[str], bool]) -> Program:
-    """One program from the pieces, given which thing is the target."""
-    build = _Build(target=target)
+def _assemble(phrases: list[Phrase], target: Phrase | None, is_place: Callable[[str], bool]) -> Program:
+    """The program of the phrases, given which phrase is the target."""
+    draft = _ProgramDraft(target=target)
     ordinal, negated, joined = 1, False, True
     i = 0
-    while i < len(pieces):
-        piece = pieces[i]
+    while i < len(phrases):
+        phrase = phrases[i]
         i += 1
-        if piece.kind == "ordinal":
-            ordinal = piece.number
-        elif piece.kind == "not":
+        if phrase.kind == "ordinal":
+            ordinal = phrase.number
+        elif phrase.kind == "not":
             negated = True
-        elif piece.kind in ("and", "break"):
+        elif phrase.kind in ("and", "break"):
             joined = True
-        elif piece.kind == "floor":
-            build.floor = build.floor or piece.text
-        elif piece.kind == "place":
-            build.room = build.room or piece.text
-        elif piece.kind == "relation":
-            i = _add_clause(build, pieces, i, is_place, (ordinal, negated, joined))
+        elif phrase.kind == "floor":
+            draft.floor = draft.floor or phrase.text
+        elif phrase.kind == "place":
+            draft.room = draft.room or phrase.text
+        elif phrase.kind == "relation":
+            i = _add_clause(draft, phrases, i, is_place, (ordinal, negated, joined))
             ordinal, negated, joined = 1, False, False
     if ordinal > 1:
-        build.clauses.append(_Clause("nth", ordinal=ordinal))  # "the second chair"
-    thing = _thing(target, build.clauses, 0, 1)
+        draft.clauses.append(_Clause("nth", ordinal=ordinal))  # "the second chair"
+    thing = _thing(target, draft.clauses, 0, 1)
     places = []
-    if build.room:
-        told = tuple(Condition(name="with", things=(_thing(one, [], 0, 1),)) for one in build.room_with)
-        places.append(Condition(name="room", things=(Thing(noun=build.room, conditions=told),), negated=build.outside))
-    if build.floor:
-        places.append(Condition(name="floor", words=build.floor))
+    if draft.room:
+        details = tuple(Condition(name="with", things=(_thing(phrase, [], 0, 1),)) for phrase in draft.room_with)
+        room = Thing(noun=draft.room, conditions=details)
+        places.append(Condition(name="room", things=(room,), negated=draft.outside))
+    if draft.floor:
+        places.append(Condition(name="floor", words=draft.floor))
     thing = thing.model_copy(update={"conditions": (*thing.conditions, *places)})
     return Program(target=thing)
 
 
-def _thing(piece: Piece | None, clauses: list[_Clause], index: int, depth: int) -> Thing:
-    """A piece with its looks and the clauses said of it: those of the target (index 0) or of a clause's anchor."""
-    looks = [] if piece is None else [Condition(name="is", words=word) for word in (piece.size, piece.color) if word]
+def _thing(phrase: Phrase | None, clauses: list[_Clause], index: int, depth: int) -> Thing:
+    """The thing of a phrase with its clauses: those of the target (index 0) or those of a clause's anchor."""
+    appearance = (
+        [] if phrase is None else [Condition(name="is", words=word) for word in (phrase.size, phrase.color) if word]
+    )
     relations = []
     for i, clause in enumerate(clauses[:MAX_CLAUSES], 1):
         if clause.of != index or (clause.anchors and depth == MAX_DEPTH):
@@ -195,57 +198,61 @@ def _thing(piece: Piece | None, clauses: list[_Clause], index: int, depth: int) 
         counts = CONDITIONS[clause.relation].number
         number = clause.ordinal if counts == "must" or (counts == "may" and clause.ordinal > 1) else 0
         relations.append(Condition(name=clause.relation, things=things, number=number, negated=clause.negated))
-    noun = piece.text if piece is not None and piece.text else ANYTHING
-    return Thing(noun=noun, conditions=(*looks, *relations))
+    noun = phrase.text if phrase is not None and phrase.text else ANYTHING
+    return Thing(noun=noun, conditions=(*appearance, *relations))
 
 
 def _add_clause(
-    build: _Build, pieces: list[Piece], i: int, is_place: Callable[[str], bool], said: tuple[int, bool, bool]
+    draft: _ProgramDraft,
+    phrases: list[Phrase],
+    i: int,
+    is_place: Callable[[str], bool],
+    modifiers: tuple[int, bool, bool],
 ) -> int:
-    """Add the relation before piece i with the anchors that follow it; returns the index after them."""
-    ordinal, negated, joined = said
-    relation = pieces[i - 1]
-    least, most = _takes(relation)
-    at_target = i < len(pieces) and pieces[i] is build.target
-    if (least, most) == (0, 1) and at_target:
-        anchors, after = [], i  # "the closest chair to the window": the anchor stands behind the target and "to"
-        if i + 2 < len(pieces) and pieces[i + 1].kind == "to" and pieces[i + 2].kind == "thing":
-            anchors = [pieces[i + 2]]
-            del pieces[i + 1 : i + 3]
+    """Add the relation before phrase i with the anchors that follow it; returns the index after them."""
+    ordinal, negated, joined = modifiers
+    relation = phrases[i - 1]
+    min_anchors, max_anchors = _anchor_counts(relation)
+    at_target = i < len(phrases) and phrases[i] is draft.target
+    if (min_anchors, max_anchors) == (0, 1) and at_target:
+        anchors, after = [], i  # "the closest chair to the window": the anchor follows the target and "to"
+        if i + 2 < len(phrases) and phrases[i + 1].kind == "to" and phrases[i + 2].kind == "thing":
+            anchors = [phrases[i + 2]]
+            del phrases[i + 1 : i + 3]
     else:
-        anchors, after = _anchors(build, pieces, i, most)
+        anchors, after = _anchors(draft, phrases, i, max_anchors)
     if len(anchors) == 1 and relation.text in ("in", "near") and anchors[0].text in WHOLE_MAP:
         return after
     if len(anchors) == 1 and relation.text in ("in", "on", "near") and is_place(anchors[0].text):
-        build.room, build.outside = build.room or anchors[0].text, negated
+        draft.room, draft.outside = draft.room or anchors[0].text, negated
         return after
-    if len(anchors) < least and relation.text not in ON_SPOT:
-        return after  # a preposition that leads nowhere: "something to sit on", "over there"
-    # without "and" or a comma, a relation belongs to the noun before it: the last anchor
-    if relation.text == "with" and i >= 2 and pieces[i - 2].kind in ("place", "thing") and build.room and not joined:
-        before = pieces[i - 2]
+    if len(anchors) < min_anchors and relation.text not in ON_SPOT:
+        return after  # a preposition that candidates nowhere: "something to sit on", "over there"
+    # without "and" or a comma, a relation belongs to the noun just before it, which is the last anchor
+    if relation.text == "with" and i >= 2 and phrases[i - 2].kind in ("place", "thing") and draft.room and not joined:
+        before = phrases[i - 2]
         if before.kind == "place" or is_place(before.text):
-            build.room_with += anchors
+            draft.room_with += anchors
             return after
     if CONDITIONS[relation.text].kind == "view":
         joined = True
-    of = 0 if joined or not build.clauses or not build.clauses[-1].anchors else len(build.clauses)
-    if ordinal == 1 and most == 0 and not joined:
+    of = 0 if joined or not draft.clauses or not draft.clauses[-1].anchors else len(draft.clauses)
+    if ordinal == 1 and max_anchors == 0 and not joined:
         of = 0
-    build.clauses.append(_Clause(relation.text, tuple(anchors), of, ordinal, negated))
+    draft.clauses.append(_Clause(relation.text, tuple(anchors), of, ordinal, negated))
     return after
 
 
-def _anchors(build: _Build, pieces: list[Piece], i: int, most: int) -> tuple[list[Piece], int]:
-    """The things that follow a relation directly, at most so many, and the index after them."""
-    found: list[Piece] = []
-    while i < len(pieces) and len(found) < most:
-        piece = pieces[i]
-        if piece.kind == "thing" and piece is not build.target:
-            found.append(piece)
-        elif piece.kind == "place":
-            build.room = build.room or piece.text
-        elif not (piece.kind == "to" or (piece.kind == "and" and found)):
+def _anchors(draft: _ProgramDraft, phrases: list[Phrase], i: int, max_count: int) -> tuple[list[Phrase], int]:
+    """The things that follow a relation directly, at most max_count, and the index after them."""
+    anchors: list[Phrase] = []
+    while i < len(phrases) and len(anchors) < max_count:
+        phrase = phrases[i]
+        if phrase.kind == "thing" and phrase is not draft.target:
+            anchors.append(phrase)
+        elif phrase.kind == "place":
+            draft.room = draft.room or phrase.text
+        elif not (phrase.kind == "to" or (phrase.kind == "and" and anchors)):
             break
         i += 1
-    return found, i
+    return anchors, i

@@ -1,6 +1,7 @@
-"""Several things weighed by one condition after the other: scores, which of them hold, and the sentences that say why.
+"""Scores of a thing's candidates while its conditions are applied one after the other, with the sentences that say why.
 
-Source: METHOD section 10, step 4 (rank by evidence). Departs: graded; what fails a condition stays listed below.
+Each condition multiplies the scores by its fits, raised to the power of its trust. Not as in the paper: a candidate
+that fails a condition is not dropped; it stays listed with a low score.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
-from placegraph.nodes.grounding.relations import HOLDS, order
+from placegraph.nodes.grounding.relations import HOLDS, rank_positions
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.scene_graph import Node
 
@@ -26,83 +27,92 @@ MEASURED = 0.6  # departs: how much of a runner-up's score its distance in the m
 Sentence = Callable[[int], str]
 
 
-class Weighing:
-    """The state of n things while their conditions are applied."""
+class ScoredCandidates:
+    """The scores of n candidates.
+
+    holds (n,): every condition so far fits. peers (n,): the candidates whose names fit about equally well.
+    is_unique: exactly one candidate has the best name. nodes: None for parts of rooms.
+    """
 
     def __init__(self, boxes: Boxes, nodes: Sequence[Node | None], names: F64, *, narrowed: bool) -> None:
-        """Names (n,): how well the noun names each; narrowed: more is said of them than the name."""
+        """`names` (n,) is how well each is named, 0..1; narrowed: the request says more than the noun."""
         self.boxes, self.nodes = boxes, nodes
         self.scores = names.astype(float)
         self.sentences: list[Sentence] = []
         best = float(names.max()) if len(names) else 0.0
         groups = [names >= best - step for step in NAME_STEPS]
-        # who says more than the name has a name that does not tell: then others must be called so too
-        told = next((group for group in groups if group.sum() > 1), groups[0]) if narrowed else groups[0]
-        self.single = bool(groups[0].sum() == 1)  # one thing alone bears the name
-        self.peers: Bool = told
-        self.scores = np.where(told, self.scores, OFF_NAME * self.scores)
+        # who says more than the noun needs to: several things must have that name, if need be a less fitting one
+        peers = next((group for group in groups if group.sum() > 1), groups[0]) if narrowed else groups[0]
+        self.is_unique = bool(groups[0].sum() == 1)  # one thing alone bears the name
+        self.peers: Bool = peers
+        self.scores = np.where(peers, self.scores, OFF_NAME * self.scores)
         self.holds: Bool = groups[-1]
-        self._ranked: Bool | None = None  # what all ranks are said of
+        self._rankable: Bool | None = None  # fixed by the first rank
 
     def __len__(self) -> int:
         return len(self.boxes)
 
-    def judged(self, values: F64, sentence: Sentence, *, trust: float = 1.0, negated: bool = False) -> None:
-        """Apply a condition's fits (n,), 0..1; negated: it is said not to be so."""
+    def apply_fits(self, values: F64, sentence: Sentence, *, trust: float = 1.0, negated: bool = False) -> None:
+        """Apply a condition's fits (n,) 0..1; negated: the request denies the condition."""
         fits = 1.0 - values if negated else values
         holds = fits >= HOLDS - 1e-9
         self.scores = self.scores * np.power(np.clip(fits, MIN, 1.0), trust)
         self.holds = self.holds & holds
         self.sentences.append(lambda i: sentence(i) if holds[i] else f"not as said: {sentence(i)}")
 
-    def hinted(self, values: F64, sentence: Sentence, trust: float) -> None:
-        """Let something speak for those that it fits, without force."""
+    def apply_hint(self, values: F64, sentence: Sentence, trust: float) -> None:
+        """Raise the scores of those that something fits, without demanding that it holds."""
         self.scores = self.scores * np.power(np.clip(values, MIN, 1.0), trust)
         self.sentences.append(sentence)
 
-    def among(self) -> Bool:
-        """(n,) those that a rank is said of: what holds so far, else what comes near to it."""
-        if self._ranked is not None:
-            return self._ranked
-        held = self.holds & self.peers
-        if held.any():
-            return held
+    def rankable(self) -> Bool:
+        """(n,) the candidates that a rank compares: those that hold so far, else those with the better scores."""
+        if self._rankable is not None:
+            return self._rankable
+        holding = self.holds & self.peers
+        if holding.any():
+            return holding
         return np.asarray(self.peers & (self.scores >= 0.5 * self.scores[self.peers].max(initial=0.0)))
 
-    def ranked(
+    def apply_rank(
         self, measure: F64, number: int, margin: float, sentence: Sentence, *, trust: float, negated: bool
     ) -> None:
-        """Apply a rank: measure (n,), greatest first; the number-th among those that hold is meant."""
-        self._ranked = self.among()
-        rows = np.flatnonzero(self._ranked & np.isfinite(measure))
+        """Apply a rank: the number-th greatest measure (n,) among the rankable candidates is meant."""
+        self._rankable = self.rankable()
+        rows = np.flatnonzero(self._rankable & np.isfinite(measure))
         if len(rows) < number and int(self.peers.sum()) >= number:
-            rows = np.flatnonzero(self.peers & np.isfinite(measure))  # the second of one: something was misread
+            # "the second" where only one holds: another condition was misread
+            rows = np.flatnonzero(self.peers & np.isfinite(measure))
         values = np.full(len(self), OUTRANKED)
-        places = order(measure[rows])
-        there = len(rows)
-        reached = min(number, there)  # of three the fifth is misread or miscounted: the last one comes nearest to it
-        if there:
-            wanted = float(measure[rows][places == reached][0])
+        places = rank_positions(measure[rows])
+        count = len(rows)
+        reached = min(number, count)  # "the fifth" of three: a misread number, the last comes nearest
+        if count:
+            reached_value = float(measure[rows][places == reached][0])
             span = max(float(np.ptp(measure[rows])), 1e-6)
-            off = np.abs(measure[rows] - wanted)
+            off = np.abs(measure[rows] - reached_value)
             runners = RUNNER_UP * (1 - MEASURED * off / span) / np.maximum(np.abs(places - reached), 1) ** 0.5
             values[rows] = np.where(places == reached, 1.0, np.where(off <= margin, LEVEL, runners))
-            values[rows] *= 1.0 if there >= number else RUNNER_UP
-        if negated:  # what the rank is not said of stays behind
+            values[rows] *= 1.0 if count >= number else RUNNER_UP
+        if negated:  # candidates outside the comparison must not gain by the negation
             values[np.setdiff1d(np.arange(len(self)), rows)] = 1 - OUTRANKED
-        place = {int(row): int(k) for row, k in zip(rows, places, strict=True)}
-        short = f"; there are only {there}, not {number}" if there < number else ""
+        position_of_row = {int(row): int(k) for row, k in zip(rows, places, strict=True)}
+        short = f"; there are only {count}, not {number}" if count < number else ""
 
-        def told(i: int) -> str:
-            return f"{sentence(i)}, number {place[i]} of {there}{short}" if i in place else f"{sentence(i)}, set aside"
+        def rank_sentence(i: int) -> str:
+            return (
+                f"{sentence(i)}, number {position_of_row[i]} of {count}{short}"
+                if i in position_of_row
+                else f"{sentence(i)}, set aside"
+            )
 
-        self.judged(values, told, trust=trust, negated=negated)
+        self.apply_fits(values, rank_sentence, trust=trust, negated=negated)
 
     def evidence(self, i: int) -> list[str]:
-        """The sentences about one of them."""
+        """The sentences about candidate i."""
         return [text for sentence in self.sentences if (text := sentence(i))]
 
-    def best(self) -> F64:
-        """(n,) scores as shares of the best."""
+    def relative_scores(self) -> F64:
+        """(n,) scores divided by the best score."""
         top = float(self.scores.max(initial=0.0))
         return np.asarray(self.scores / top if top > 0 else self.scores)

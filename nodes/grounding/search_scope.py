@@ -1,6 +1,6 @@
-"""Narrow the hierarchy by the place words of a request: floors, then rooms and locations, then objects.
+"""Narrow the search by the place words of a request: floors, then rooms and locations, then objects.
 
-Source: paper, "Selecting Related Objects". Departs: in code, by names and ids that exist, instead of a call a layer.
+Source: paper, "Selecting Related Objects". Not as in the paper: code matches names, without a model call per layer.
 """
 
 from __future__ import annotations
@@ -8,16 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from placegraph.nodes.grounding.name_matching import HEAD, Fit, Names
+from placegraph.nodes.grounding.name_matching import HEAD, NameMatch, NameMatcher
 from placegraph.nodes.grounding.phrase_segmentation import ORDINALS, WHOLE_MAP
 from placegraph.nodes.grounding.program import Condition, Thing
-from placegraph.nodes.grounding.program_syntax import write
+from placegraph.nodes.grounding.program_syntax import format_program
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 PLACE_LIKENESS = 0.7  # departs: the embeddings put bedroom and living room at 0.5, which are not the same place
-# What a room of a kind holds, for maps that have no rooms or none of that name; the first ones tell most.
-TYPICAL: dict[str, tuple[str, ...]] = {
+# What rooms of a kind typically hold, the most typical first; used when the map has no room of that name.
+TYPICAL_OBJECTS: dict[str, tuple[str, ...]] = {
     "bathroom": ("toilet", "bathtub", "shower", "urinal", "bathroom vanity"),
     "kitchen": ("stove", "refrigerator", "kitchen counter", "kitchen cabinet", "dishwasher"),
     "bedroom": ("bed", "nightstand"),
@@ -32,14 +32,15 @@ TYPICAL: dict[str, tuple[str, ...]] = {
     "sleeping area": ("bed",),
 }
 
-RankPlaces = Callable[[Thing, Sequence[Fit]], list[Node]]
+RankPlaces = Callable[[Thing, Sequence[NameMatch]], list[Node]]
 
 
 @dataclass
-class Scope:
-    """Where to look: the objects and places left, what was done in words, and whether the words could be followed.
+class SearchScope:
+    """Where to search: the objects and places left, notes on what was narrowed, and whether all words were followed.
 
-    thing: the target without its place words; what they leave for geometry ("in the closet") is among its conditions.
+    thing: the target without its place conditions; those that geometry must judge ("in the closet") stay among its
+    conditions. hints: conditions that raise scores without having to hold.
     """
 
     objects: list[Node]
@@ -47,29 +48,30 @@ class Scope:
     thing: Thing = field(default_factory=Thing)
     notes: list[str] = field(default_factory=list)
     sure: bool = True
-    hints: list[Condition] = field(default_factory=list)  # what speaks for the target without force
+    hints: list[Condition] = field(default_factory=list)
 
 
-def narrow(graph: SceneGraph, target: Thing, names: Names, rank_places: RankPlaces) -> Scope:
-    """Objects under the floors and rooms that a target is said to be in. A place that is not there narrows nothing.
+def narrow_scope(graph: SceneGraph, target: Thing, names: NameMatcher, rank_places: RankPlaces) -> SearchScope:
+    """The objects below the floors and rooms that the target is said to be in. An unknown place narrows nothing.
 
-    rank_places: the places of those called so that fit the conditions of a place best ("the bedroom with the desk").
+    rank_places: chooses, of the places with a matching name, those that fit the place's conditions best ("the bedroom
+    with the desk").
     """
-    scope = Scope(graph.layer("object"), [*graph.layer("floor"), *graph.layer("room"), *graph.layer("location")])
-    kept: list[Condition] = []
-    for condition in target.said("floor"):  # first: the largest bedroom upstairs is not that of the house
+    scope = SearchScope(graph.layer("object"), [*graph.layer("floor"), *graph.layer("room"), *graph.layer("location")])
+    remaining: list[Condition] = []
+    for condition in target.conditions_named("floor"):  # first: the largest bedroom upstairs is not that of the house
         _by_floor(graph, scope, condition)
-    for condition in (one for one in target.conditions if one.name != "floor"):
+    for condition in (other for other in target.conditions if other.name != "floor"):
         if condition.name == "room" or (condition.name == "in" and _names_place(graph, condition.things[0], names)):
-            kept += _by_room(graph, scope, condition, names, rank_places)
+            remaining += _by_room(graph, scope, condition, names, rank_places)
         else:
-            kept.append(condition)
-    scope.thing = target.model_copy(update={"conditions": tuple(kept)})
+            remaining.append(condition)
+    scope.thing = target.model_copy(update={"conditions": tuple(remaining)})
     return scope
 
 
-def _by_floor(graph: SceneGraph, scope: Scope, condition: Condition) -> None:
-    floors = floors_called(graph, condition.words)
+def _by_floor(graph: SceneGraph, scope: SearchScope, condition: Condition) -> None:
+    floors = match_floors(graph, condition.words)
     if floors:
         looked = "away from" if condition.negated else "on"
         scope.notes.append(f"looked {looked} {condition.words}: {', '.join(floor.id for floor in floors)}")
@@ -82,27 +84,27 @@ def _by_floor(graph: SceneGraph, scope: Scope, condition: Condition) -> None:
 
 
 def _by_room(
-    graph: SceneGraph, scope: Scope, condition: Condition, names: Names, rank_places: RankPlaces
+    graph: SceneGraph, scope: SearchScope, condition: Condition, names: NameMatcher, rank_places: RankPlaces
 ) -> list[Condition]:
-    """Narrow by one place; returns what is left of it for geometry to judge."""
+    """Narrow by one place condition; returns the conditions that are left for geometry to judge."""
     place = condition.things[0]
     if place.noun in WHOLE_MAP and not place.conditions:
         return []  # in the house, in the room
     floors = [inner for inner in place.conditions if inner.name == "floor"]
     for inner in floors:
         _by_floor(graph, scope, inner)
-    place = place.model_copy(update={"conditions": tuple(one for one in place.conditions if one not in floors)})
-    fits = places_called(place.noun, [node for node in scope.places if node.layer != "floor"], names)
-    if fits:
-        places = rank_places(place, fits)
+    place = place.model_copy(update={"conditions": tuple(inner for inner in place.conditions if inner not in floors)})
+    matches = match_places(place.noun, [node for node in scope.places if node.layer != "floor"], names)
+    if matches:
+        places = rank_places(place, matches)
         listed = ", ".join(f"{node.name} {node.id}" for node in places)
-        scope.notes.append(f"looked {'outside' if condition.negated else 'in'} {write(place)}: {listed}")
+        scope.notes.append(f"looked {'outside' if condition.negated else 'in'} {format_program(place)}: {listed}")
         _keep_below(graph, scope, places, outside=condition.negated)
         return []
     if _is_thing(place.noun, graph, names):  # the closet, the shower: a thing that one can be in
         return [condition.model_copy(update={"name": "in"})]
     scope.sure = False
-    typical = next((noun for noun in _typical(place.noun, names) if names.is_known(noun, scope.objects)), "")
+    typical = next((noun for noun in _typical_objects(place.noun, names) if names.is_known(noun, scope.objects)), "")
     if typical:
         scope.notes.append(f"no place in the map is called {place.noun}; took what is near the {typical} for it")
         scope.hints.append(Condition(name="near", things=(Thing(noun=typical),), negated=condition.negated))
@@ -111,50 +113,54 @@ def _by_room(
     return []
 
 
-def _is_thing(noun: str, graph: SceneGraph, names: Names) -> bool:
-    """Whether an object is called so by its words; likeness alone makes a toilet of a bathroom."""
-    return any(fit.score >= HEAD for fit in names.named(noun, graph.layer("object")))
+def _is_thing(noun: str, graph: SceneGraph, names: NameMatcher) -> bool:
+    """Whether an object has this name by its words; by embedding similarity alone a bathroom would be a toilet."""
+    return any(match.score >= HEAD for match in names.best_matches(noun, graph.layer("object")))
 
 
-def _typical(noun: str, names: Names) -> tuple[str, ...]:
-    return next((things for kind, things in TYPICAL.items() if names.likeness(noun, kind) >= PLACE_LIKENESS), ())
+def _typical_objects(noun: str, names: NameMatcher) -> tuple[str, ...]:
+    return next(
+        (things for kind, things in TYPICAL_OBJECTS.items() if names.similarity(noun, kind) >= PLACE_LIKENESS), ()
+    )
 
 
-def _names_place(graph: SceneGraph, thing: Thing, names: Names) -> bool:
-    """Whether "in (X)" speaks of a room: a place is called so and no object, or it is a word for a kind of room."""
+def _names_place(graph: SceneGraph, thing: Thing, names: NameMatcher) -> bool:
+    """Whether X in "in (X)" is a place: the name of a place and of no object, or a kind of room."""
     if thing.noun in ("", "room") or _is_thing(thing.noun, graph, names):
         return False
     places = [*graph.layer("room"), *graph.layer("location")]
-    return bool(places_called(thing.noun, places, names)) or bool(_typical(thing.noun, names))
+    return bool(match_places(thing.noun, places, names)) or bool(_typical_objects(thing.noun, names))
 
 
-def _keep_below(graph: SceneGraph, scope: Scope, tops: Sequence[Node], *, outside: bool = False) -> None:
-    wanted = {top.id for top in tops}
+def _keep_below(graph: SceneGraph, scope: SearchScope, tops: Sequence[Node], *, outside: bool = False) -> None:
+    floor_words = {top.id for top in tops}
 
     def is_kept(node: Node) -> bool:
-        return outside != any(step.id in wanted for step in graph.path(node.id))
+        return outside != any(step.id in floor_words for step in graph.path(node.id))
 
     scope.objects = [node for node in scope.objects if is_kept(node)]
     scope.places = [node for node in scope.places if is_kept(node)]
 
 
-def places_called(name: str, places: Sequence[Node], names: Names) -> list[Fit]:
-    """Rooms and locations with that name: where it is the strongest one, else where it is among the likely ones."""
-    fits = [fit for fit in names.named(name, places) if names.likeness(name, fit.tag) >= PLACE_LIKENESS]
-    strongest = [fit for fit in fits if fit.node.tags and fit.tag == fit.node.tags[0].name]
-    return strongest or fits
+def match_places(name: str, places: Sequence[Node], names: NameMatcher) -> list[NameMatch]:
+    """Rooms and locations with that name: those whose strongest tag it is, else those that have it among their tags."""
+    matches = [m for m in names.best_matches(name, places) if names.similarity(name, m.tag) >= PLACE_LIKENESS]
+    strongest = [match for match in matches if match.node.tags and match.tag == match.node.tags[0].name]
+    return strongest or matches
 
 
-def floors_called(graph: SceneGraph, words: str) -> list[Node]:
-    """Floors by words: "upstairs" is all but the lowest, "second floor" the second from below, or by tag or id."""
+def match_floors(graph: SceneGraph, words: str) -> list[Node]:
+    """Floors by words: "upstairs" is all but the lowest, "second floor" the second from below; or by tag or id."""
     floors = sorted(graph.layer("floor"), key=lambda floor: (float(floor.box[0, 2]), floor.id))
-    wanted = normal_form(words)
-    tagged = [floor for floor in floors if wanted in {normal_form(tag.name) for tag in floor.tags}]
-    tagged = tagged or [floor for floor in floors if floor.id.lower() == wanted]
+    floor_words = normal_form(words)
+    tagged = [floor for floor in floors if floor_words in {normal_form(tag.name) for tag in floor.tags}]
+    tagged = tagged or [floor for floor in floors if floor.id.lower() == floor_words]
     if tagged or not floors:
         return tagged
-    said = [word for word in wanted.split() if word not in ("on", "in", "the", "of", "at", "floor", "level", "house")]
-    first = said[0] if said else ""
+    content_words = [
+        word for word in floor_words.split() if word not in ("on", "in", "the", "of", "at", "floor", "level", "house")
+    ]
+    first = content_words[0] if content_words else ""
     if first in ("upstairs", "upstair", "upper", "above"):
         return floors[1:]
     if first in ("downstairs", "downstair", "lower", "below"):

@@ -1,7 +1,8 @@
-"""From where left, right, front and behind are meant: a view that the request names, the asker's, or the room's.
+"""Choose the viewpoint from which left, right, in front of and behind are judged.
 
-Source: METHOD section 9 (viewpoint c, f = (a - c) / |a - c|, l = z x f). Departs: who faces a thing stands square
-before it, so that the line of sight is one of its axes; and a thing with a front of its own is seen from there.
+In the order of preference: what the request names ("facing the window"), the asker's own position, the front of the
+anchor, the centre of its room. With viewpoint c and anchor a the forward direction is f = (a - c) / |a - c| and left is
+z x f. Not as in the paper: who faces a thing stands squarely before it, so f is one of the thing's axes.
 """
 
 from __future__ import annotations
@@ -28,20 +29,23 @@ HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """One viewer: place (2,) and line of sight (2,) or None: to what is looked at. Metres, world frame."""
+class Viewpoint:
+    """A position `eye` (2,) in metres and a forward unit vector (2,), both in the building's frame.
+
+    forward: None when the viewer turns to whatever is judged. trust: 0..1, lower when nobody named a viewpoint.
+    """
 
     source: str  # "asker", "room centre", "one who faces window O4"
     eye: F64
     forward: F64 | None = None
     trust: float = 1.0
-    z_m: float = 0.0  # where it stands
-    others: tuple[View, ...] = ()  # of several doors: from each room its own is meant
+    z_m: float = 0.0  # height of the floor at the position
+    others: tuple[Viewpoint, ...] = ()  # one per door when several match; each room uses its own
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
-    """Lines of sight to m things: forward (m, 2) unit, eye (m, 2), whose, and how much they can be relied on (m,)."""
+class LinesOfSight:
+    """Lines of sight to m things: forward (m, 2) unit vectors, eye (m, 2) m, sources in words, trust (m,) 0..1."""
 
     forward: F64
     eye: F64
@@ -54,36 +58,36 @@ class Lines:
         return np.stack((-self.forward[:, 1], self.forward[:, 0]), axis=1)
 
 
-class Views:
-    """The view of a request on one map, in the order of preference: said, the asker's, the thing's front, the room."""
+class ViewpointSelector:
+    """Chooses the viewpoints of one request on one map."""
 
     def __init__(self, layout: Layout, asker_world: F64, heading_rad: float = np.nan) -> None:
-        """asker_world: (3,) metres, NaN when not given; heading_rad about z from +x, NaN when not given."""
+        """asker_world: (3,) metres, building frame, NaN when not given; heading_rad: about z from +x, NaN likewise."""
         self.layout = layout
-        self.said: View | None = None  # what the request says, once it is known
-        self.asker: View | None = None
+        self.requested: Viewpoint | None = None  # set by the program executor
+        self.asker: Viewpoint | None = None
         if np.isfinite(asker_world).all():
             heading = np.array([np.cos(heading_rad), np.sin(heading_rad)]) if np.isfinite(heading_rad) else None
-            self.asker = View("asker", asker_world[:2], heading)
+            self.asker = Viewpoint("asker", asker_world[:2], heading)
 
     @property
-    def named(self) -> View | None:
-        """The view that the request or the asker gives."""
-        return self.said or self.asker
+    def explicit(self) -> Viewpoint | None:
+        """The viewpoint given by the request, else by the asker."""
+        return self.requested or self.asker
 
-    def toward(self, anchors: Boxes) -> Lines:
-        """How each of the anchors is seen."""
+    def lines_of_sight(self, anchors: Boxes) -> LinesOfSight:
+        """The line of sight to each anchor."""
         middle = self.layout.room_center(anchors.room)
         forward, eye = anchors.center[:, :2] - middle, middle
         sources, trust = ["room centre"] * len(anchors), np.full(len(anchors), MIDDLE_TRUST)
-        view = self.named
-        if view is not None:
-            views = [self._of_room(view, int(room)) for room in anchors.room]
-            eye = np.array([one.eye for one in views]).reshape(-1, 2)
+        viewpoint = self.explicit
+        if viewpoint is not None:
+            viewpoints = [self._nearest_to_room(viewpoint, int(room)) for room in anchors.room]
+            eye = np.array([viewpoint.eye for viewpoint in viewpoints]).reshape(-1, 2)
             forward = anchors.center[:, :2] - eye
-            if view is self.said and view.forward is not None:
-                forward = np.tile(view.forward, (len(anchors), 1))
-            sources, trust = [one.source for one in views], np.array([one.trust for one in views], float)
+            if viewpoint is self.requested and viewpoint.forward is not None:
+                forward = np.tile(viewpoint.forward, (len(anchors), 1))
+            sources, trust = [v.source for v in viewpoints], np.array([v.trust for v in viewpoints], float)
         else:
             for j in range(len(anchors)):
                 if np.isfinite(anchors.front[j]).all():
@@ -91,39 +95,42 @@ class Views:
                     eye[j] = anchors.center[j, :2] + 2.0 * anchors.front[j]
                     sources[j] = f"front of {anchors.labels[j]}"
                 else:
-                    forward[j] = self.square_on(anchors, j)
-        return Lines(_unit(forward), eye, tuple(sources), trust)
+                    forward[j] = self.facing_direction(anchors, j)
+        return LinesOfSight(_unit(forward), eye, tuple(sources), trust)
 
-    def over(self, targets: Boxes, hint: Boxes | None = None) -> View:
-        """How several things are seen at once, with a line of sight; hint: what they are told by."""
+    def overlooking(self, targets: Boxes, reference: Boxes | None = None) -> Viewpoint:
+        """One viewpoint for several targets, always with a direction.
+
+        reference: the anchors of the targets' other conditions: "the left pillow on the bed" is seen from the bed's
+        foot.
+        """
         middle = targets.center[:, :2].mean(axis=0) if len(targets) else np.zeros(2)
-        view = self.named
+        viewpoint = self.explicit
         rooms = targets.room.tolist()
         room = max(set(rooms), key=rooms.count) if rooms else -1
-        if view is not None:
-            view = self._of_room(view, room)
-            forward = view.forward if view.forward is not None else _unit((middle - view.eye)[None])[0]
-            return View(view.source, view.eye, forward if forward.any() else np.array([0.0, 1.0]), view.trust)
-        if hint is not None and len(hint) and hint.ids[0]:
-            faced = self.facing(hint.take([0]))
-            return View(faced.source, faced.eye, faced.forward, HINT_TRUST)
+        if viewpoint is not None:
+            viewpoint = self._nearest_to_room(viewpoint, room)
+            forward = viewpoint.forward if viewpoint.forward is not None else _unit((middle - viewpoint.eye)[None])[0]
+            return Viewpoint(
+                viewpoint.source, viewpoint.eye, forward if forward.any() else np.array([0.0, 1.0]), viewpoint.trust
+            )
+        if reference is not None and len(reference) and reference.ids[0]:
+            faced = self.in_front_of(reference.take([0]))
+            return Viewpoint(faced.source, faced.eye, faced.forward, HINT_TRUST)
         eye = self.layout.room_center(np.array([room]))[0]
         whole = Boxes(
             ("them",), ("",), targets.low.min(axis=0, keepdims=True), targets.high.max(axis=0, keepdims=True),
             np.zeros(1), np.full((1, 2), np.nan), np.array([room]),
         ) if len(targets) else None  # fmt: skip
-        forward = self.square_on(whole, 0) if whole is not None else np.array([0.0, 1.0])
+        forward = self.facing_direction(whole, 0) if whole is not None else np.array([0.0, 1.0])
         # in the middle of them: look along +y, so that left is -x as on a map
-        return View("room centre", eye, forward if forward.any() else np.array([0.0, 1.0]), MIDDLE_TRUST)
+        return Viewpoint("room centre", eye, forward if forward.any() else np.array([0.0, 1.0]), MIDDLE_TRUST)
 
-    def square_on(self, things: Boxes, j: int) -> F64:
-        """(2,) the line of sight of one who stands before a thing in its room: square to it where it has a broad side.
-
-        Zero for what is in the very middle of the room.
-        """
+    def facing_direction(self, things: Boxes, j: int) -> F64:
+        """(2,) forward direction of one who stands in the room squarely before thing j; 0 at the room's very centre."""
         center, room = things.center[j, :2], things.room[j]
-        way = center - self.layout.room_center(np.array([room]))[0]
-        length = float(np.linalg.norm(way))
+        from_room = center - self.layout.room_center(np.array([room]))[0]
+        length = float(np.linalg.norm(from_room))
         size, yaw = things.size[j, :2], float(things.yaw[j])
         axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
         directions = np.concatenate((axes, -axes))
@@ -137,31 +144,33 @@ class Views:
         is_long_faced = things.labels[j].rsplit(" ", 1)[0] in LONG_FACED
         broad = (long if is_long_faced else ~long) * (ratio >= (LONG_ENOUGH if is_long_faced else ELONGATED))
         if not broad.any() and (free > WALL_M).all():
-            return way / length if length > 0.05 else np.zeros(2)
-        score = directions @ (way / length) if length > 0.05 else np.zeros(4)
+            return from_room / length if length > 0.05 else np.zeros(2)
+        score = directions @ (from_room / length) if length > 0.05 else np.zeros(4)
         score = score + 1.0 * (free <= WALL_M) + 1.0 * broad
         return np.asarray(directions[int(np.argmax(score))])
 
-    def facing(self, things: Boxes) -> View:
-        """The view of one who looks at the first of some things, square on."""
+    def in_front_of(self, things: Boxes) -> Viewpoint:
+        """The viewpoint of one who faces the first of some things."""
         front = things.front[0]
-        forward = -front / np.linalg.norm(front) if np.isfinite(front).all() else self.square_on(things, 0)
+        forward = -front / np.linalg.norm(front) if np.isfinite(front).all() else self.facing_direction(things, 0)
         center = things.center[0, :2]
         room = self.layout.room_center(things.room[:1])[0]
         away = max(float((center - room) @ forward), float(np.abs(forward) @ things.size[0, :2]) / 2 + 1.0)
-        return View(f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None)
+        return Viewpoint(
+            f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None
+        )
 
-    def facing_most(self, things: Boxes) -> View:
-        """The view of one who looks at several things: towards the wall that most of them are on ("the windows")."""
-        row = self._row(things)
+    def in_front_of_most(self, things: Boxes) -> Viewpoint:
+        """The viewpoint of one who faces several things ("the windows"): towards the wall that most of them are on."""
+        row = self._in_front_of_row(things)
         if row is not None:
             return row
-        ways = [self.facing(things.take([j])) for j in range(min(len(things), MAX_FACED))]
-        sights = np.array([np.zeros(2) if way.forward is None else way.forward for way in ways])
-        return ways[int(np.argmax((sights @ sights.T > SAME_WAY).sum(axis=1)))]
+        viewpoints = [self.in_front_of(things.take([j])) for j in range(min(len(things), MAX_FACED))]
+        directions = np.array([np.zeros(2) if v.forward is None else v.forward for v in viewpoints])
+        return viewpoints[int(np.argmax((directions @ directions.T > SAME_WAY).sum(axis=1)))]
 
-    def _row(self, things: Boxes) -> View | None:
-        """The view of one who has a row of things of one room before him, across it; None where they are none."""
+    def _in_front_of_row(self, things: Boxes) -> Viewpoint | None:
+        """The viewpoint before a row of things in one room, looking across the row; None when they form no row."""
         if len(things) < 2 or len(set(things.room.tolist())) > 1:
             return None
         centers = things.center[:, :2]
@@ -174,29 +183,31 @@ class Views:
             return None
         forward = np.round(axes[:, 0]) * np.sign(across)
         across = float((middle - room) @ forward)
-        return View(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
+        return Viewpoint(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
 
-    def away(self, things: Boxes) -> View:
-        """The view of one who has the first of some things behind."""
-        forward = -self.square_on(things, 0)
-        return View(f"{things.labels[0]} in the back", things.center[0, :2], forward if forward.any() else None)
+    def with_back_to(self, things: Boxes) -> Viewpoint:
+        """The viewpoint of one who turns the back to the first of some things."""
+        forward = -self.facing_direction(things, 0)
+        return Viewpoint(f"{things.labels[0]} in the back", things.center[0, :2], forward if forward.any() else None)
 
-    def at(self, things: Boxes) -> View:
-        """The view of one who stands at a thing and looks to what is asked for; of several, at that of the room."""
-        views = [View(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))]
-        return View(views[0].source, views[0].eye, others=tuple(views))
+    def at(self, things: Boxes) -> Viewpoint:
+        """The viewpoint of one who stands at a thing and turns to what is judged; of several, at the room's own."""
+        viewpoints = [
+            Viewpoint(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))
+        ]
+        return Viewpoint(viewpoints[0].source, viewpoints[0].eye, others=tuple(viewpoints))
 
-    def _of_room(self, view: View, room: int) -> View:
-        """Of the places that one may stand at the one of a room; of a view that is not from a place itself.
+    def _nearest_to_room(self, viewpoint: Viewpoint, room: int) -> Viewpoint:
+        """Of a viewpoint with alternatives (several doors) the one at this room; any other viewpoint unchanged.
 
-        Where none of them is at the room (not every doorway has a door) the asker's view, or a doubtful one.
+        When none of them is at the room (not every doorway has a door): the asker's, else the nearest, less trusted.
         """
-        if not view.others:
-            return view
+        if not viewpoint.others:
+            return viewpoint
         low, high = self.layout.room_low[room], self.layout.room_high[room]
-        places = np.array([[*one.eye, one.z_m] for one in view.others])
+        places = np.array([[*other.eye, other.z_m] for other in viewpoint.others])
         away = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0), axis=1)
-        nearest = view.others[int(np.argmin(away))]
+        nearest = viewpoint.others[int(np.argmin(away))]
         if away.min() <= AT_ROOM_M:
             return nearest
         return self.asker or replace(nearest, trust=MIDDLE_TRUST)

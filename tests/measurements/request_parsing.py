@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_by_examples, read_request
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, parse_by_examples, parse_by_model
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
-from placegraph.nodes.grounding.program import Thing, normal
-from placegraph.nodes.grounding.program_syntax import read, write
+from placegraph.nodes.grounding.program import Thing, normalized
+from placegraph.nodes.grounding.program_syntax import format_program, parse_program
 from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel
@@ -40,7 +40,7 @@ def by_rules(text):
     box = np.zeros((2, 3))
     building = Node(id="B0", parent="", tags=(), box=box, footprint=box[:, :2], first_frame=-1, last_frame=-1)
     graph = SceneGraph.of([building])
-    reasoner = Reasoner(Names(TextEncoder().encode), None, (*ROOM_TYPES, *LOCATION_TYPES), use_model=False)
+    reasoner = Reasoner(NameMatcher(TextEncoder().encode), None, (*ROOM_TYPES, *LOCATION_TYPES), use_model=False)
     return reasoner.parse(graph, text).target, 1.0
 
 
@@ -48,9 +48,11 @@ def main(arguments):
     adapter = Path(next((a for a in arguments if a.endswith(".gguf")), default_adapter_path()))
     model = LanguageModel(adapter_path=adapter)
     ways = {
-        "adapter": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(read_request(model, text)),
-        "plain": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(read_request(model, text, adapted=False)),
-        "examples": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(read_by_examples(model, text)),
+        "adapter": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(parse_by_model(model, text)),
+        "plain": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(
+            parse_by_model(model, text, use_adapter=False)
+        ),
+        "examples": lambda text: (lambda r: (r.thing or Thing(), r.confidence))(parse_by_examples(model, text)),
         "rules": by_rules,
     }
     kept = [(one.text, [one.program]) for one in examples(1_000_003, 500, 300, held_out=True)]
@@ -66,12 +68,12 @@ def main(arguments):
                 except QueryError:
                     thing, confidence = Thing(), 0.0
                 seconds.append(time.monotonic() - began)
-                right = [normal(read(program)) for program in programs]
-                exact.append(normal(thing) in right)
-                noun.append(normal(thing).noun in {one.noun for one in right})
+                right = [normalized(parse_program(program)) for program in programs]
+                exact.append(normalized(thing) in right)
+                noun.append(normalized(thing).noun in {one.noun for one in right})
                 sure.append(confidence)
                 if "-v" in arguments and not exact[-1]:
-                    print(f"  {text!r}\n     {write(thing)}\n     {' | '.join(programs)}  ({confidence:.2f})")
+                    print(f"  {text!r}\n     {format_program(thing)}\n     {' | '.join(programs)}  ({confidence:.2f})")
             ok, sure = np.array(exact), np.array(sure)
             parts = f"{np.median(sure[ok]) if ok.any() else 0:.3f}, {np.median(sure[~ok]) if (~ok).any() else 0:.3f}"
             times = f"{np.percentile(seconds, 50):.2f} | {np.percentile(seconds, 95):.2f}"

@@ -15,11 +15,11 @@ import numpy as np
 
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.camera import detect_source
-from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_by_examples, read_request
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, parse_by_examples, parse_by_model
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
 from placegraph.nodes.grounding.program import Program, Thing
-from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.program_syntax import parse_program
 from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, QueryError, SourceError
@@ -52,9 +52,9 @@ class QuestionScene:
     boxes: Mapping[str, F64]
     true_ids: bool = False
 
-    def question(self, asked: HouseQuestion, mode: str = "program") -> Question:
+    def question(self, question: HouseQuestion, mode: str = "program") -> Question:
         """What the asker sends: the text, and where it stands in the graph's frame."""
-        return make_question(asked.text, mode=mode, pose=eye_in_map(asked, self.true_from_graph))
+        return make_question(question.text, mode=mode, pose=eye_in_map(question, self.true_from_graph))
 
 
 def house_scene(seed: int, count: int) -> QuestionScene:
@@ -84,55 +84,55 @@ class VariantRunner:
 
     def __init__(self, threads: int = 1) -> None:
         self.model = LanguageModel(threads=threads, adapter_path=default_adapter_path())
-        names = Names(TextEncoder().encode)
+        names = NameMatcher(TextEncoder().encode)
         self.reasoner = Reasoner(names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
-        self._read: dict[tuple[str, str], Program] = {}
-        self._cost: dict[tuple[str, str], float] = {}  # ms of each reading
+        self._programs: dict[tuple[str, str], Program] = {}
+        self._parse_ms: dict[tuple[str, str], float] = {}  # ms of each reading
         self._saved_ms, self._saved_calls = 0.0, 0  # of a kept reading: added to the time of the variant that uses it
-        self._flat: dict[str, SceneGraph] = {}
+        self._flat_graphs: dict[str, SceneGraph] = {}
 
-    def ask(self, variant: str, scene: QuestionScene, asked: HouseQuestion) -> QuestionResult:
+    def ask(self, variant: str, scene: QuestionScene, question: HouseQuestion) -> QuestionResult:
         """The reply of one variant."""
         calls, began = self.model.calls, time.perf_counter()
         self._saved_ms, self._saved_calls = 0.0, 0
         try:
-            reply = VARIANTS[variant].answer(self, scene, asked)
+            reply = VARIANTS[variant].answer(self, scene, question)
         except QueryError:
             reply = {"status": "error", "object_id": None}
         ms = (time.perf_counter() - began) * 1e3 + self._saved_ms
         calls = self.model.calls - calls + self._saved_calls
         return QuestionResult(reply["status"], reply["object_id"] or "", calls, ms)
 
-    def by_mode(self, scene: QuestionScene, asked: HouseQuestion, mode: str) -> dict[str, Any]:
+    def by_mode(self, scene: QuestionScene, question: HouseQuestion, mode: str) -> dict[str, Any]:
         """The answer of one of the product's modes."""
-        return self.reasoner.answer(scene.graph, 0, scene.question(asked, mode))
+        return self.reasoner.answer(scene.graph, 0, scene.question(question, mode))
 
     def by_program(
-        self, scene: QuestionScene, asked: HouseQuestion, program: Program, graph: SceneGraph | None = None
+        self, scene: QuestionScene, question: HouseQuestion, program: Program, graph: SceneGraph | None = None
     ) -> dict[str, Any]:
         """The answer to a program that is given."""
-        return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(asked), program)
+        return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(question), program)
 
-    def program(self, asked: HouseQuestion, how: str = "adapter") -> Program:
+    def program(self, question: HouseQuestion, how: str = "adapter") -> Program:
         """What the model reads: with the adapter, without, or without but with examples before the request."""
-        key = (how, asked.text)
-        if key in self._read:
-            self._saved_ms, self._saved_calls = self._cost[key], 1
+        key = (how, question.text)
+        if key in self._programs:
+            self._saved_ms, self._saved_calls = self._parse_ms[key], 1
         else:
             began = time.perf_counter()
             if how == "examples":
-                reading = read_by_examples(self.model, asked.text)
+                parsed = parse_by_examples(self.model, question.text)
             else:
-                reading = read_request(self.model, asked.text, adapted=how == "adapter")
-            self._read[key] = Program(target=reading.thing or Thing(noun=asked.text))
-            self._cost[key] = (time.perf_counter() - began) * 1e3
-        return self._read[key]
+                parsed = parse_by_model(self.model, question.text, use_adapter=how == "adapter")
+            self._programs[key] = Program(target=parsed.thing or Thing(noun=question.text))
+            self._parse_ms[key] = (time.perf_counter() - began) * 1e3
+        return self._programs[key]
 
     def flat(self, scene: QuestionScene) -> SceneGraph:
         """The scene's objects in one room without a name."""
-        if scene.name not in self._flat:
-            self._flat[scene.name] = without_hierarchy(scene.graph)
-        return self._flat[scene.name]
+        if scene.name not in self._flat_graphs:
+            self._flat_graphs[scene.name] = without_hierarchy(scene.graph)
+        return self._flat_graphs[scene.name]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Variant:
 
 VARIANTS: Mapping[str, Variant] = {
     "program": Variant("the default: read by the model with its adapter", lambda a, s, q: a.by_mode(s, q, "program")),
-    "oracle": Variant("the true program in place of the reading", lambda a, s, q: a.by_program(s, q, true_program(q))),
+    "oracle": Variant("the true program in place of the parsed", lambda a, s, q: a.by_program(s, q, true_program(q))),
     "no relations": Variant(
         "only the noun, room and floor count, as in HOV-SG",
         lambda a, s, q: a.by_program(s, q, without_relations(a.program(q))),
@@ -174,21 +174,21 @@ def chosen_variants(names: str) -> list[str]:
     return chosen
 
 
-def true_program(asked: HouseQuestion) -> Program:
+def true_program(question: HouseQuestion) -> Program:
     """The program that the question was made from."""
-    return Program(target=read(asked.program))
+    return Program(target=parse_program(question.program))
 
 
 def without_relations(program: Program) -> Program:
     """The noun with its room and floor alone."""
-    kept = tuple(condition for condition in program.target.conditions if condition.kind == "place")
-    return Program(target=Thing(noun=program.target.noun, conditions=kept))
+    conditions = tuple(condition for condition in program.target.conditions if condition.kind == "place")
+    return Program(target=Thing(noun=program.target.noun, conditions=conditions))
 
 
 def without_places(program: Program) -> Program:
     """The request without room and floor."""
-    kept = tuple(condition for condition in program.target.conditions if condition.kind != "place")
-    return Program(target=Thing(noun=program.target.noun, conditions=kept))
+    conditions = tuple(condition for condition in program.target.conditions if condition.kind != "place")
+    return Program(target=Thing(noun=program.target.noun, conditions=conditions))
 
 
 def without_hierarchy(graph: SceneGraph) -> SceneGraph:

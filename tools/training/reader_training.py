@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from placegraph.nodes.grounding.llm_parser import OPENING, asked, reply
+from placegraph.nodes.grounding.llm_parser import OPENING, model_input, model_output
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.language.language_model import LanguageModel, default_model_path
 from placegraph.tools.training.lora_export import write_adapter
@@ -36,8 +36,8 @@ class TokenBatch:
         self.tokens: list[list[int]] = []
         self.targets: list[list[int]] = []
         for request in requests:
-            target = model.tokenize_completion(reply(request.program))
-            self.tokens.append(model.tokenize_prompt(asked(request.text), OPENING) + target[:-1])
+            target = model.tokenize_completion(model_output(request.program))
+            self.tokens.append(model.tokenize_prompt(model_input(request.text), OPENING) + target[:-1])
             self.targets.append(target)
 
     def logits(self, network: nn.Module) -> tuple[Tensor, Tensor]:

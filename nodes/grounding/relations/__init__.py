@@ -1,8 +1,8 @@
-"""Spatial relations, computed when a question needs them: one family per module, each exporting RELATION.
+"""Spatial relations, computed when a question needs them: one group of relations per module, exported as RELATION.
 
-A family judges all pairs of targets and anchors at once by their boxes. A relation's fit is 0..1 and holds from 0.5 on;
-nothing is forced: the evidence sentence of a pair says the numbers. A rank gives a measure instead, greatest first.
-Source: METHOD section 9; paper, "Selecting Related Objects" (semantic and metric edges between targets and anchors).
+A module evaluates all pairs of targets and anchors at once from their boxes. A relation's fit is 0..1 and holds from
+0.5 on. A rank ("closest", "leftmost") gives a measure instead, greatest first. Each pair has a sentence with numbers.
+Source: paper, "Selecting Related Objects" (semantic and metric edges between targets and anchors).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes, Layout
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.node import available, plugin
 
@@ -22,27 +22,27 @@ HOLDS = 0.5  # a relation holds from this fit on
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """What is asked of a relation: how all targets (n) stand to all anchors (m).
+class RelationQuery:
+    """The input of a relation: n targets and m anchors; no anchors for `corner` and ranks without a thing.
 
-    seconds: for "between" the other anchor of each pair, as many as anchors. hint: what else the targets are told by,
-    which says from where they are seen when nothing else does. Without a thing (`corner`, ranks) there are no anchors.
+    second_anchors: for "between", the other anchor of each pair. reference: anchors of the targets' other conditions,
+    which give ranks their viewpoint when nothing else does.
     """
 
     relation: str
     targets: Boxes
     anchors: Boxes | None
     layout: Layout
-    views: Views
-    seconds: Boxes | None = None
-    hint: Boxes | None = None
+    viewpoints: ViewpointSelector
+    second_anchors: Boxes | None = None
+    reference: Boxes | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Fits:
-    """values (n, m), m = 1 without anchors; the sentence of a pair; of ranks the margin below which none is greater.
+class PairFits:
+    """The output of a relation: values (n, m), m = 1 without anchors, and the sentence of each pair.
 
-    trust: 0..1, how much it decides; below 1 where no viewer was named.
+    margin: rank measures closer than this are equal. trust: 0..1, how much it counts; lower without a named viewpoint.
     """
 
     values: F64
@@ -54,52 +54,54 @@ class Fits:
 
 @dataclass(frozen=True)
 class Relation:
-    """One family: the phrases that the rules know each relation by, and the judge of all of them."""
+    """The relations of one module: the phrases by which the rule parser knows each, and the function for all."""
 
     phrases: dict[str, tuple[str, ...]]
-    judge: Callable[[Case], Fits]
+    evaluate: Callable[[RelationQuery], PairFits]
 
 
 @cache
-def families() -> dict[str, Relation]:
-    """Every relation and rank by its name in the schema, found by file name."""
-    found: dict[str, Relation] = {}
+def relations_by_name() -> dict[str, Relation]:
+    """The relation module of each relation and rank name in `CONDITIONS`."""
+    relations: dict[str, Relation] = {}
     for module in available(__package__ or ""):
         family: Relation = plugin(__package__ or "", module, "RELATION", "relation")
-        found.update(dict.fromkeys(family.phrases, family))
-    return found
+        relations.update(dict.fromkeys(family.phrases, family))
+    return relations
 
 
 @cache
-def triggers() -> dict[tuple[str, ...], str]:
-    """Trigger phrases as word tuples to relation names; a phrase belongs to one relation."""
+def trigger_phrases() -> dict[tuple[str, ...], str]:
+    """Relation names by trigger phrase (a tuple of words); a phrase belongs to one relation."""
     return {
-        tuple(phrase.split()): name for name, family in sorted(families().items()) for phrase in family.phrases[name]
+        tuple(phrase.split()): name
+        for name, family in sorted(relations_by_name().items())
+        for phrase in family.phrases[name]
     }
 
 
-def gaps_m(a: Boxes, b: Boxes) -> F64:
-    """(n, m, 3) free metres between boxes along each axis, negative where they overlap by so much."""
+def axis_gaps_m(a: Boxes, b: Boxes) -> F64:
+    """(n, m, 3) gap in metres between boxes along each axis; negative where they overlap."""
     return np.maximum(a.low[:, None] - b.high[None], b.low[None] - a.high[:, None])
 
 
-def apart_m(gaps: F64) -> F64:
-    """(n, m) metres between the surfaces of boxes; 0 where they touch."""
+def distance_m(gaps: F64) -> F64:
+    """(n, m) metres between the surfaces of boxes; 0 when they touch. gaps: of `axis_gaps_m`."""
     return np.asarray(np.linalg.norm(np.maximum(gaps, 0), axis=2))
 
 
-def flat_m(gaps: F64) -> F64:
-    """(n, m) the same as seen from above."""
+def horizontal_distance_m(gaps: F64) -> F64:
+    """(n, m) horizontal metres between the boxes' footprints."""
     return np.asarray(np.linalg.norm(np.maximum(gaps[..., :2], 0), axis=2))
 
 
-def halving(values_m: F64, half_m: float) -> F64:
-    """1 at 0 m, 0.5 at half_m, and so on."""
+def decay(values_m: F64, half_m: float) -> F64:
+    """Exponential decay: 1 at 0 m, 0.5 at half_m."""
     return np.asarray(np.power(0.5, np.maximum(values_m, 0) / half_m))
 
 
-def share_over(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = False) -> F64:
-    """(n, m) share of the target's footprint (smaller: of the smaller one's) that lies over or under the anchor's."""
+def footprint_overlap(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = False) -> F64:
+    """(n, m) share of the target's footprint (smaller: of the smaller footprint) that overlaps the anchor's."""
     low = np.maximum(targets.low[:, None, :2], anchors.low[None, :, :2])
     high = np.minimum(targets.high[:, None, :2], anchors.high[None, :, :2])
     common = np.prod(np.clip(high - low, 0, None) + 0.01 * (high >= low), axis=2)
@@ -109,8 +111,8 @@ def share_over(targets: Boxes, anchors: Boxes, gaps: F64, *, smaller: bool = Fal
     return np.asarray(np.minimum(common / area, 1.0) * (gaps[..., :2].max(axis=2) <= 0))
 
 
-def order(values: F64) -> I64:
-    """(n,) the place of each value, 1: the greatest; equal ones in their order."""
+def rank_positions(values: F64) -> I64:
+    """(n,) the rank of each value, 1 for the greatest; equal values keep their order."""
     places = np.empty(len(values), np.int64)
     places[np.argsort(-values, kind="stable")] = np.arange(1, len(values) + 1)
     return places

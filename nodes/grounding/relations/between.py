@@ -1,47 +1,44 @@
-"""Between two anchors: the target's place along and beside the line that joins them.
-
-Source: METHOD section 9. Departs: along the middle part of the line and not far beside it.
-"""
+"""Between two anchors: the target's position along the line that joins them, and its distance beside that line."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.relations import Case, Fits, Relation
+from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery
 
 ASIDE_SHARE = 0.5  # departs: distance beside the line, as a share of its length, at which it is half between
 ASIDE_LEAST_M = 0.4  # departs: for anchors that stand close together
 LENGTH_M = 6.0  # departs: of several pairs of a kind the closer pair is meant
 
 
-def judge(case: Case) -> Fits:
+def evaluate(query: RelationQuery) -> PairFits:
     """All targets and pairs of anchors."""
-    first, second = case.anchors, case.seconds
+    first, second = query.anchors, query.second_anchors
     assert first is not None and second is not None
     a, b = first.center[:, :2], second.center[:, :2]
     line = b - a
     length = np.maximum(np.linalg.norm(line, axis=1), 1e-6)
-    offset = case.targets.center[:, None, :2] - a[None]
+    offset = query.targets.center[:, None, :2] - a[None]
     along = np.einsum("nmk,mk->nm", offset, line) / length**2
     aside = np.abs(offset[..., 0] * line[None, :, 1] - offset[..., 1] * line[None, :, 0]) / length
-    # beside the middle of two long beds one is still between them
+    # what is beside the middle of two long beds is still between them
     normal = np.abs(np.stack((-line[:, 1], line[:, 0]), axis=1)) / length[:, None]
-    reach = [np.einsum("mk,mk->m", normal, one.size[:, :2]) / 2 for one in (first, second)]
+    reach = [np.einsum("mk,mk->m", normal, anchor.size[:, :2]) / 2 for anchor in (first, second)]
     aside = np.maximum(aside - np.minimum(*reach), 0)
     widest = np.maximum(ASIDE_SHARE * length, ASIDE_LEAST_M)
     inner = np.clip((0.5 - np.abs(along - 0.5)) * 5, 0, 1)  # a half at a tenth of the way, whole from a fifth on
-    rise = np.abs(case.targets.center[:, None, 2] - ((first.center + second.center) / 2)[None, :, 2])
+    rise = np.abs(query.targets.center[:, None, 2] - ((first.center + second.center) / 2)[None, :, 2])
     inner = inner * (1 - 1.2 * np.abs(along - 0.5))  # the nearer to the middle the better
     values = inner * np.power(0.5, (aside / widest) ** 2 + length / LENGTH_M / 4 + np.maximum(rise - 1, 0))
 
     def sentence(i: int, j: int) -> str:
         ends = f"from {first.labels[j]} to {second.labels[j]}"
-        return f"{case.targets.labels[i]} is {along[i, j]:.0%} of the way {ends}, {aside[i, j]:.2f} m beside that line"
+        return f"{query.targets.labels[i]} is {along[i, j]:.0%} of the way {ends}, {aside[i, j]:.2f} m beside that line"
 
-    return Fits(values, sentence)
+    return PairFits(values, sentence)
 
 
 RELATION = Relation(
     phrases={"between": ("between", "in between", "amid", "in the middle of the two", "in the middle of two")},
-    judge=judge,
+    evaluate=evaluate,
 )

@@ -1,16 +1,15 @@
-"""Left, right, in front of and behind an anchor, and across from it, as seen along the line of sight to it.
+"""Left of, right of, in front of, behind and across from an anchor, as seen along the line of sight to it.
 
-Source: METHOD section 9; left and right of a thing with a front are those of one who faces its front, as in Sr3D.
-Departs: margins, so that what is straight ahead is neither left nor right; nearness counts, as people use these words.
-Where nobody says who looks, "in front of" and "behind" fall back on nearness (of 2,206 human sentences nearest fits
-best) and left and right count less.
+Left and right of a thing with a front are those of a viewer who faces its front, as in Sr3D. Margins leave what is
+straight ahead neither left nor right, and nearness counts, as people use these words. Without a named viewpoint "in
+front of" and "behind" mostly mean nearness (the best reading of 2,206 human sentences), and left and right count less.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.relations import Case, Fits, Relation, apart_m, gaps_m, halving
+from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery, axis_gaps_m, decay, distance_m
 from placegraph.runtime.arrays import F64
 
 MARGIN_M = 0.1  # departs: about the error of a box centre from a depth camera
@@ -22,54 +21,55 @@ ACROSS_M = 0.8  # departs: what is nearer is beside, not across
 DEGREES_45 = 0.7
 
 
-def judge(case: Case) -> Fits:
+def evaluate(query: RelationQuery) -> PairFits:
     """All pairs."""
-    anchors = case.anchors
+    anchors = query.anchors
     assert anchors is not None
-    lines = case.views.toward(anchors)
-    offset = (case.targets.center[:, None] - anchors.center[None])[..., :2]
-    left = np.einsum("nmk,mk->nm", offset, lines.left)
-    ahead = np.einsum("nmk,mk->nm", offset, lines.forward)
-    gap = apart_m(gaps_m(case.targets, anchors))
+    sights = query.viewpoints.lines_of_sight(anchors)
+    offset = (query.targets.center[:, None] - anchors.center[None])[..., :2]
+    left = np.einsum("nmk,mk->nm", offset, sights.left)
+    ahead = np.einsum("nmk,mk->nm", offset, sights.forward)
+    gap = distance_m(axis_gaps_m(query.targets, anchors))
     half = anchors.size[:, :2] / 2
-    deep = np.einsum("mk,mk->m", np.abs(lines.forward), half)
-    wide = np.einsum("mk,mk->m", np.abs(lines.left), half)
-    blind = np.asarray(~lines.forward.any(axis=1))
-    if case.relation in ("left", "right"):
-        main = left if case.relation == "left" else -left
-        share = _share(main, wide, np.abs(ahead) - deep)
-        values = np.where(blind, 0.5, share) * halving(gap, SIDE_M)
-    elif case.relation in ("front", "behind"):
-        main = ahead if case.relation == "behind" else -ahead
-        share = _share(main, deep, np.abs(left) - wide)
-        unsaid = lines.trust < 1
+    deep = np.einsum("mk,mk->m", np.abs(sights.forward), half)
+    wide = np.einsum("mk,mk->m", np.abs(sights.left), half)
+    blind = np.asarray(~sights.forward.any(axis=1))
+    if query.relation in ("left", "right"):
+        main = left if query.relation == "left" else -left
+        share = _direction_fit(main, wide, np.abs(ahead) - deep)
+        values = np.where(blind, 0.5, share) * decay(gap, SIDE_M)
+    elif query.relation in ("front", "behind"):
+        main = ahead if query.relation == "behind" else -ahead
+        share = _direction_fit(main, deep, np.abs(left) - wide)
+        unsaid = sights.trust < 1
         mild = MILD + (1 - MILD) * share
-        values = np.where(unsaid | blind, np.where(blind, MILD, mild), share) * halving(gap, FRONT_M)
+        values = np.where(unsaid | blind, np.where(blind, MILD, mild), share) * decay(gap, FRONT_M)
     else:
         share = -ahead / np.maximum(np.linalg.norm(offset, axis=2), 1e-9)
-        straight = halving(np.maximum(np.abs(left) - wide, 0), 2.0)
+        straight = decay(np.maximum(np.abs(left) - wide, 0), 2.0)
         values = np.clip(0.5 + (share - DEGREES_45), 0, 1) * np.clip(gap / (2 * ACROSS_M), 0, 1) * straight
 
     def sentence(i: int, j: int) -> str:
-        a, b = case.targets.labels[i], anchors.labels[j]
-        seen = f"seen from the {lines.sources[j]}"
+        a, b = query.targets.labels[i], anchors.labels[j]
+        seen = f"seen from the {sights.sources[j]}"
         if blind[j]:
-            return f"{b} is at the {lines.sources[j]}, from where it has no sides; {a} is {gap[i, j]:.2f} m from it"
-        if case.relation in ("left", "right"):
+            return f"{b} is at the {sights.sources[j]}, from where it has no sides; {a} is {gap[i, j]:.2f} m from it"
+        if query.relation in ("left", "right"):
             side = "left" if left[i, j] > 0 else "right"
             return f"{a} is {abs(left[i, j]):.2f} m to the {side} of {b}, {seen}"
         side = "farther than" if ahead[i, j] > 0 else "nearer than"
         return f"{a} is {abs(ahead[i, j]):.2f} m {side} {b} {seen} and {gap[i, j]:.2f} m from it"
 
-    trust = float(lines.trust.max()) if len(anchors) and case.relation in ("left", "right") else 1.0
-    return Fits(values, sentence, trust=trust)
+    trust = float(sights.trust.max()) if len(anchors) and query.relation in ("left", "right") else 1.0
+    return PairFits(values, sentence, trust=trust)
 
 
-def _share(main: F64, half: F64, cross: F64) -> F64:
-    """Fit 0..1 of a direction: 1 from 45 degrees on, a half at 15, none on the other side.
+def _direction_fit(main: F64, half: F64, cross: F64) -> F64:
+    """Fit 0..1 of a direction: 1 from 45 degrees off the other axis on, 0.5 at 15 degrees, 0 on the other side.
 
-    main (n, m): metres that way from the anchor's middle, half (m,) of them within it; cross (n, m): metres beyond its
-    edge to the other way: what stands before the left end of a sofa is before it, and hardly to its left.
+    main (n, m): metres from the anchor's centre in the direction, of which half (m,) lie within the anchor.
+    cross (n, m): metres beyond the anchor's edge across the direction, so that what stands before the left end of a
+    sofa is before it and hardly to its left.
     """
     beyond = np.maximum(main - half, 0) + WITHIN * np.maximum(main, 0)
     share = np.where(main > 0, beyond / np.maximum(np.hypot(beyond, np.maximum(cross, 0)), 1e-9), -1.0)
@@ -94,5 +94,5 @@ RELATION = Relation(
             "directly across from",
         ),
     },
-    judge=judge,
+    evaluate=evaluate,
 )  # fmt: skip

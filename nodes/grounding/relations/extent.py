@@ -1,6 +1,6 @@
-"""Largest, smallest, tallest, shortest, longest, highest, lowest among the targets.
+"""Largest, smallest, tallest, shortest, longest, highest and lowest of the targets.
 
-Source: METHOD section 9. Departs: size by the two longer sides first, as the third of flat things is mostly noise.
+Size counts the two longer sides first, because the third side of flat things is mostly measurement noise.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
-from placegraph.nodes.grounding.relations import Case, Fits, Relation
+from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery
 from placegraph.runtime.arrays import F64
 
 THIRD = 0.25  # departs: how much the shortest side counts
@@ -16,8 +16,8 @@ SIZE_MARGIN = 0.05  # departs: log of size; 5 % is below what boxes from a depth
 HEIGHT_MARGIN_M = 0.05  # departs: as above, in metres
 
 
-def bulk(boxes: Boxes) -> F64:
-    """(N,) log of how large things look."""
+def log_size(boxes: Boxes) -> F64:
+    """(N,) logarithm of how large things look."""
     sides = np.sort(np.maximum(boxes.size, 0.02), axis=1)
     return np.asarray(np.log(sides[:, 2]) + np.log(sides[:, 1]) + THIRD * np.log(sides[:, 0]))
 
@@ -27,14 +27,14 @@ def length_m(boxes: Boxes) -> F64:
     return np.asarray(boxes.size[:, :2].max(axis=1))
 
 
-def judge(case: Case) -> Fits:
+def evaluate(query: RelationQuery) -> PairFits:
     """One value a target, greatest first."""
-    boxes, name = case.targets, case.relation
+    boxes, name = query.targets, query.relation
     sign = -1.0 if name in ("smallest", "shortest", "lowest") else 1.0
     if name in ("largest", "smallest"):
         volume = np.prod(boxes.size, axis=1)
-        return Fits(
-            sign * bulk(boxes)[:, None],
+        return PairFits(
+            sign * log_size(boxes)[:, None],
             lambda i, _: f"{boxes.labels[i]} fills a box of {volume[i]:.3f} m3",
             SIZE_MARGIN,
         )
@@ -44,7 +44,7 @@ def judge(case: Case) -> Fits:
         values, words = length_m(boxes), "{} is {:.2f} m long"
     else:
         values, words = boxes.center[:, 2], "the middle of {} is at a height of {:.2f} m"
-    return Fits(sign * values[:, None], lambda i, _: words.format(boxes.labels[i], values[i]), HEIGHT_MARGIN_M)
+    return PairFits(sign * values[:, None], lambda i, _: words.format(boxes.labels[i], values[i]), HEIGHT_MARGIN_M)
 
 
 RELATION = Relation(
@@ -57,5 +57,5 @@ RELATION = Relation(
         "highest": ("highest", "topmost", "uppermost", "higher"),
         "lowest": ("lowest", "bottommost", "lower"),
     },
-    judge=judge,
+    evaluate=evaluate,
 )

@@ -1,7 +1,7 @@
-"""Near and against, closest and farthest, alone: by the distance between box surfaces.
+"""Near, against, closest and farthest, by the distance between box surfaces.
 
-Source: paper, metric edges ("object A is in 3 meters of object B"). Departs: surfaces, not centres (METHOD section 9),
-so that a chair beside a long table is beside it; of several near ones the nearest is meant most.
+Source: paper, metric edges ("object A is in 3 meters of object B"). Not as in the paper: distances between surfaces,
+not centres, so that a chair beside a long table is near it.
 """
 
 from __future__ import annotations
@@ -9,7 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
-from placegraph.nodes.grounding.relations import Case, Fits, Relation, apart_m, flat_m, gaps_m, halving
+from placegraph.nodes.grounding.relations import (
+    PairFits,
+    Relation,
+    RelationQuery,
+    axis_gaps_m,
+    decay,
+    distance_m,
+    horizontal_distance_m,
+)
 from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST
 from placegraph.runtime.arrays import F64
 
@@ -21,62 +29,64 @@ MARGIN_M = 0.05  # departs: distances that differ by less cannot be told apart b
 MIDDLES = 0.1  # departs: share of the distance of middles that tells apart what touches the same thing
 
 
-def walled(targets: Boxes, anchors: Boxes) -> F64:
-    """(n, m) 1 where two things are in different rooms; a place is in none."""
+def in_different_rooms(targets: Boxes, anchors: Boxes) -> F64:
+    """(n, m) 1.0 where two things are in different rooms, else 0.0; places are in no room."""
     a, b = targets.room[:, None], anchors.room[None]
     apart = (a != b) & (a >= 0) & (b >= 0) & ~targets.is_place[:, None] & ~anchors.is_place[None]
     return np.asarray(apart.astype(float))
 
 
-def _to_viewer(case: Case) -> Fits:
-    """Ranks without a thing: by the distance to who looks, else to what else was said, else to the room's middle."""
-    sign = -1.0 if case.relation == "closest" else 1.0
-    if case.views.named is None and case.hint is not None:
-        hinted = _judge_rank(Case(case.relation, case.targets, case.hint, case.layout, case.views))
-        return Fits(hinted.values[:, :1], hinted.sentence, MARGIN_M, MIDDLE_TRUST)
-    view = case.views.over(case.targets)
-    center = case.targets.center[:, :2]
-    low, high = case.targets.low[:, :2], case.targets.high[:, :2]
-    away = np.linalg.norm(np.maximum(np.maximum(low - view.eye, view.eye - high), 0), axis=1)
-    away = away + MIDDLES * np.linalg.norm(center - view.eye, axis=1)
-    return Fits(
-        sign * away[:, None],
-        lambda i, _: f"{case.targets.labels[i]} is {away[i]:.2f} m from the {view.source}",
+def _rank_by_viewer_distance(query: RelationQuery) -> PairFits:
+    """Ranks without an anchor: by the distance to the viewer, else to the reference, else to the room's centre."""
+    sign = -1.0 if query.relation == "closest" else 1.0
+    if query.viewpoints.explicit is None and query.reference is not None:
+        by_reference = _rank_by_anchor_distance(
+            RelationQuery(query.relation, query.targets, query.reference, query.layout, query.viewpoints)
+        )
+        return PairFits(by_reference.values[:, :1], by_reference.sentence, MARGIN_M, MIDDLE_TRUST)
+    viewpoint = query.viewpoints.overlooking(query.targets)
+    center = query.targets.center[:, :2]
+    low, high = query.targets.low[:, :2], query.targets.high[:, :2]
+    distance = np.linalg.norm(np.maximum(np.maximum(low - viewpoint.eye, viewpoint.eye - high), 0), axis=1)
+    distance = distance + MIDDLES * np.linalg.norm(center - viewpoint.eye, axis=1)
+    return PairFits(
+        sign * distance[:, None],
+        lambda i, _: f"{query.targets.labels[i]} is {distance[i]:.2f} m from the {viewpoint.source}",
         MARGIN_M,
-        view.trust,
+        viewpoint.trust,
     )
 
 
-def _judge_rank(case: Case) -> Fits:
-    if case.anchors is None:
-        return _to_viewer(case)
-    anchors = case.anchors
-    gap = apart_m(gaps_m(case.targets, anchors))
-    through = walled(case.targets, anchors)
-    middles = np.linalg.norm(case.targets.center[:, None] - anchors.center[None], axis=2)
-    sign = -1.0 if case.relation == "closest" else 1.0
+def _rank_by_anchor_distance(query: RelationQuery) -> PairFits:
+    if query.anchors is None:
+        return _rank_by_viewer_distance(query)
+    anchors = query.anchors
+    gap = distance_m(axis_gaps_m(query.targets, anchors))
+    through = in_different_rooms(query.targets, anchors)
+    middles = np.linalg.norm(query.targets.center[:, None] - anchors.center[None], axis=2)
+    sign = -1.0 if query.relation == "closest" else 1.0
 
     def sentence(i: int, j: int) -> str:
         other = ", in another room" if through[i, j] else ""
-        return f"{case.targets.labels[i]} is {gap[i, j]:.2f} m from {anchors.labels[j]}{other}"
+        return f"{query.targets.labels[i]} is {gap[i, j]:.2f} m from {anchors.labels[j]}{other}"
 
-    return Fits(sign * (gap + MIDDLES * middles + THROUGH_WALL_M * through), sentence, MARGIN_M)
+    return PairFits(sign * (gap + MIDDLES * middles + THROUGH_WALL_M * through), sentence, MARGIN_M)
 
 
-def judge(case: Case) -> Fits:
+def evaluate(query: RelationQuery) -> PairFits:
     """All pairs."""
-    if case.relation in ("closest", "farthest"):
-        return _judge_rank(case)
-    anchors = case.anchors
+    if query.relation in ("closest", "farthest"):
+        return _rank_by_anchor_distance(query)
+    anchors = query.anchors
     assert anchors is not None
-    gaps = gaps_m(case.targets, anchors)
-    gap = apart_m(gaps)
-    if case.relation == "near":
-        values = halving(gap, NEAR_M)
+    gaps = axis_gaps_m(query.targets, anchors)
+    gap = distance_m(gaps)
+    if query.relation == "near":
+        values = decay(gap, NEAR_M)
     else:
         shells = np.array([not one for one in anchors.ids], bool)[None]  # the walls of a room's box
-        values = np.where(shells, halving(flat_m(gaps), WALL_M), halving(gap, AGAINST_M))
-    return Fits(values, lambda i, j: f"{case.targets.labels[i]} is {gap[i, j]:.2f} m from {anchors.labels[j]}")
+        values = np.where(shells, decay(horizontal_distance_m(gaps), WALL_M), decay(gap, AGAINST_M))
+    return PairFits(values, lambda i, j: f"{query.targets.labels[i]} is {gap[i, j]:.2f} m from {anchors.labels[j]}")
 
 
 RELATION = Relation(
@@ -96,5 +106,5 @@ RELATION = Relation(
             "farther away from", "further away from",
         ),
     },
-    judge=judge,
+    evaluate=evaluate,
 )  # fmt: skip

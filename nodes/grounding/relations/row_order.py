@@ -1,84 +1,87 @@
-"""Places in a row as seen by a viewer: leftmost, rightmost, frontmost, backmost, the middle one, the n-th.
+"""The order of things in a row as seen by a viewer: leftmost, rightmost, frontmost, backmost, the middle, the n-th.
 
-Source: METHOD section 9. Departs: who looks at several things sees them in order of bearing from where they stand, or
-along the line square to the line of sight.
+Things are ordered by their bearing from the viewer, or across the line of sight when the viewer faces a wall.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.relations import Case, Fits, Relation, apart_m, gaps_m
-from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST, View
+from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery, axis_gaps_m, distance_m
+from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST, Viewpoint
 from placegraph.runtime.arrays import F64
 
 MARGIN_M = 0.1  # departs: peers have no margin; about the error of a box centre from a depth camera
-DOORS = ("door", "doorway", "doorframe", "entrance", "door frame")
+DOOR_NAMES = ("door", "doorway", "doorframe", "entrance", "door frame")
 
 
-def _across_sight(case: Case, view: View) -> F64:
-    """(n,) metres to the left of the line of sight."""
-    assert view.forward is not None
-    offset = case.targets.center[:, :2] - view.eye
-    ahead, left = offset @ view.forward, offset @ np.array([-view.forward[1], view.forward[0]])
-    # what one looks at along a fixed line is ordered along the line across it; from a place by bearing
-    if not len(left) or view.source.startswith("place before") or not (ahead > 0.3).all():
+def _lateral_order(query: RelationQuery, viewpoint: Viewpoint) -> F64:
+    """(n,) position of each target to the left of the line of sight, m."""
+    assert viewpoint.forward is not None
+    offset = query.targets.center[:, :2] - viewpoint.eye
+    ahead, left = offset @ viewpoint.forward, offset @ np.array([-viewpoint.forward[1], viewpoint.forward[0]])
+    # before a wall or a row the order is that across the line of sight, from a point it is that of the bearings
+    if not len(left) or viewpoint.source.startswith("place before") or not (ahead > 0.3).all():
         return np.asarray(left)
     return np.asarray(np.arctan2(left, ahead) * float(np.linalg.norm(offset, axis=1).mean()))
 
 
-def _entrance_view(case: Case) -> View | None:
-    """Who speaks of the back of a room without a viewer sees it from its door."""
-    doors = [i for i, one in enumerate(case.layout.all.labels) if one.rsplit(" ", 1)[0] in DOORS]
-    rooms = set(case.targets.room.tolist())
-    doors = [i for i in doors if int(case.layout.all.room[i]) in rooms]
+def _viewpoint_at_door(query: RelationQuery) -> Viewpoint | None:
+    """The view into the room from its only door: "the back of the room" without a viewpoint is meant from there."""
+    doors = [i for i, label in enumerate(query.layout.all.labels) if label.rsplit(" ", 1)[0] in DOOR_NAMES]
+    rooms = set(query.targets.room.tolist())
+    doors = [i for i in doors if int(query.layout.all.room[i]) in rooms]
     if len(doors) != 1 or len(rooms) != 1:
         return None
-    door = case.layout.all.take(doors)
-    forward = -case.views.square_on(door, 0)
-    return View(door.labels[0], door.center[0, :2], forward, MIDDLE_TRUST) if forward.any() else None
+    door = query.layout.all.take(doors)
+    forward = -query.viewpoints.facing_direction(door, 0)
+    return Viewpoint(door.labels[0], door.center[0, :2], forward, MIDDLE_TRUST) if forward.any() else None
 
 
-def judge(case: Case) -> Fits:
-    """One value a target, greatest first; of `middle` and `nth` the order along the row, from the left."""
-    targets = case.targets
-    if case.relation == "nth" and bool(targets.is_place.all()):  # the second bedroom: in the order of their ids
+def evaluate(query: RelationQuery) -> PairFits:
+    """One value per target, greatest first; for `middle` and `nth` the position along the row from the left."""
+    targets = query.targets
+    if query.relation == "nth" and bool(targets.is_place.all()):  # the second bedroom: in the order of their ids
         values = -np.arange(len(targets), dtype=float)
-        return Fits(values[:, None], lambda i, _: f"{targets.labels[i]} by its id", 0.0)
-    if case.relation == "nth" and case.views.named is None and case.hint is not None:
-        gap = apart_m(gaps_m(targets, case.hint)).min(axis=1)
-        return Fits(-gap[:, None], lambda i, _: f"{targets.labels[i]} is {gap[i]:.2f} m from there", MARGIN_M)
-    view = case.views.over(targets, case.hint)
-    if case.relation == "nth" and case.views.said is not None and case.views.said.forward is None:
-        # the first bed as one comes in: of those who stand at a place, the nearest comes first
-        away = np.linalg.norm(targets.center[:, :2] - view.eye, axis=1)
-        told = f"m from the {view.source}"
-        return Fits(-away[:, None], lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {told}", MARGIN_M)
-    if case.relation in ("frontmost", "backmost"):
-        if view.source == "room centre":
-            view = _entrance_view(case) or view
-        assert view.forward is not None
-        ahead = (targets.center[:, :2] - view.eye) @ view.forward
-        sign = 1.0 if case.relation == "backmost" else -1.0
+        return PairFits(values[:, None], lambda i, _: f"{targets.labels[i]} by its id", 0.0)
+    if query.relation == "nth" and query.viewpoints.explicit is None and query.reference is not None:
+        gap = distance_m(axis_gaps_m(targets, query.reference)).min(axis=1)
+        return PairFits(-gap[:, None], lambda i, _: f"{targets.labels[i]} is {gap[i]:.2f} m from there", MARGIN_M)
+    viewpoint = query.viewpoints.overlooking(targets, query.reference)
+    if (
+        query.relation == "nth"
+        and query.viewpoints.requested is not None
+        and query.viewpoints.requested.forward is None
+    ):
+        # "the first bed as you come in": from a place, the nearest comes first
+        away = np.linalg.norm(targets.center[:, :2] - viewpoint.eye, axis=1)
+        words = f"m from the {viewpoint.source}"
+        return PairFits(-away[:, None], lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {words}", MARGIN_M)
+    if query.relation in ("frontmost", "backmost"):
+        if viewpoint.source == "room centre":
+            viewpoint = _viewpoint_at_door(query) or viewpoint
+        assert viewpoint.forward is not None
+        ahead = (targets.center[:, :2] - viewpoint.eye) @ viewpoint.forward
+        sign = 1.0 if query.relation == "backmost" else -1.0
         words, values = "m along the line of sight", sign * ahead
     else:
-        left = _across_sight(case, view)
-        if case.relation == "middle":
-            left = _along_row(case, left)
+        left = _lateral_order(query, viewpoint)
+        if query.relation == "middle":
+            left = _along_row(query, left)
         ahead = left - left.mean() if len(left) else left
-        values = -left if case.relation == "rightmost" else left
+        values = -left if query.relation == "rightmost" else left
         words = "m to the left of their middle"
-    sentence = f"{words}, seen from the {view.source}"
-    return Fits(
-        values[:, None], lambda i, _: f"{targets.labels[i]} is {ahead[i]:+.2f} {sentence}", MARGIN_M, view.trust
+    sentence = f"{words}, seen from the {viewpoint.source}"
+    return PairFits(
+        values[:, None], lambda i, _: f"{targets.labels[i]} is {ahead[i]:+.2f} {sentence}", MARGIN_M, viewpoint.trust
     )  # fmt: skip
 
 
-def _along_row(case: Case, left: F64) -> F64:
-    """The order of a row that runs along the line of sight is that of its own direction."""
-    if len(left) < 3 or case.views.named is not None:
+def _along_row(query: RelationQuery, left: F64) -> F64:
+    """The order along the row's own direction when three or more things have no explicit viewpoint."""
+    if len(left) < 3 or query.viewpoints.explicit is not None:
         return left
-    flat = case.targets.center - case.targets.center.mean(axis=0)
+    flat = query.targets.center - query.targets.center.mean(axis=0)
     axis = int(np.argmax(np.ptp(flat, axis=0)))
     return np.asarray(flat[:, axis])
 
@@ -98,5 +101,5 @@ RELATION = Relation(
         "middle": (),
         "nth": (),
     },
-    judge=judge,
+    evaluate=evaluate,
 )  # fmt: skip

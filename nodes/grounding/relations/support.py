@@ -1,6 +1,6 @@
-"""On, under, above, in, and their inverses: holds, with. By footprints, tops and bottoms of boxes.
+"""On, under, above and in, and their inverses holds and with, from the footprints, tops and bottoms of boxes.
 
-Source: METHOD section 9. Departs: graded, for what a depth camera measures; 1 mm contact is never seen.
+Fits are graded, because a depth camera never measures exact contact.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import (
-    Case,
-    Fits,
+    PairFits,
     Relation,
-    apart_m,
-    flat_m,
-    gaps_m,
-    halving,
-    share_over,
+    RelationQuery,
+    axis_gaps_m,
+    decay,
+    distance_m,
+    footprint_overlap,
+    horizontal_distance_m,
 )
 from placegraph.runtime.arrays import F64
 
@@ -40,39 +40,39 @@ PART_M, BESIDE_M = 0.1, 0.75  # departs: "with" also means a part that touches, 
 
 
 def on_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
-    """(n, m): the target rests on the anchor, or hangs on it."""
-    over = share_over(targets, anchors, gaps)
+    """(n, m) fit: the target rests on the anchor or hangs on it."""
+    over = footprint_overlap(targets, anchors, gaps)
     gap = targets.low[:, None, 2] - anchors.high[None, :, 2]
     height = anchors.size[None, :, 2]
     raised = (targets.low[:, None, 2] - anchors.low[None, :, 2]) / (STANDS_SHARE * height)
-    # a bottom below the top: thin things lie in the noise of both boxes, in thick ones it counts how far up it is
-    sunk = np.maximum(np.clip(raised, 0, 1), halving(-gap, CONTACT_M))
+    # a bottom below the anchor's top: for thin anchors this is noise, for thick ones its height within them counts
+    sunk = np.maximum(np.clip(raised, 0, 1), decay(-gap, CONTACT_M))
     above_middle = targets.center[:, None, 2] > anchors.center[None, :, 2]
-    rests = np.clip(over * 1.25, 0, 1) * np.where(gap > 0, halving(gap, CONTACT_M), sunk * above_middle)
+    rests = np.clip(over * 1.25, 0, 1) * np.where(gap > 0, decay(gap, CONTACT_M), sunk * above_middle)
     off = (targets.low[:, None, 2] - anchors.low[None, :, 2]) > OFF_GROUND_M
     upright = anchors.size[None, :, 2] > targets.size[:, None, 2]
-    hangs = HANGS_SHARE * halving(apart_m(gaps), HANGS_M) * off * upright
+    hangs = HANGS_SHARE * decay(distance_m(gaps), HANGS_M) * off * upright
     return np.maximum(rests, hangs)
 
 
 def under_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
-    """(n, m): the target is lower than the anchor, below it or nearly so."""
-    over = share_over(targets, anchors, gaps, smaller=True)
+    """(n, m) fit: the target is lower than the anchor and below it or nearly below it."""
+    over = footprint_overlap(targets, anchors, gaps, smaller=True)
     rise = anchors.center[None, :, 2] - targets.center[:, None, 2]
     apart = anchors.low[None, :, 2] - targets.high[:, None, 2]  # negative: they overlap in height
     lower = np.clip(0.5 + rise / (2 * MIX_M), 0, 1)
-    # without a footprint in common it must be wholly lower: what stands beside a table is not under it
-    aside = 0.8 * halving(flat_m(gaps), ASIDE_M) * np.clip(0.5 + (apart + MIX_M) / (2 * MIX_M), 0, 1)
-    below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * halving(apart, RISE_M)
-    # a chair that is tucked under a desk mostly stands before it, and its back rises above the desk's middle
+    # without overlapping footprints it must be entirely lower: what stands beside a table is not under it
+    aside = 0.8 * decay(horizontal_distance_m(gaps), ASIDE_M) * np.clip(0.5 + (apart + MIX_M) / (2 * MIX_M), 0, 1)
+    below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * decay(apart, RISE_M)
+    # a chair tucked under a desk is mostly before it, and its back rises above the desk's middle
     legs = np.array([_has_legs(label) for label in anchors.labels], bool)[None]
     stands = (targets.low[:, None, 2] - anchors.low[None, :, 2]) < OFF_GROUND_M
     lowered = targets.center[:, None, 2] < anchors.high[None, :, 2]
-    return np.maximum(below, TUCKED * legs * stands * lowered * halving(flat_m(gaps), TUCKED_M))
+    return np.maximum(below, TUCKED * legs * stands * lowered * decay(horizontal_distance_m(gaps), TUCKED_M))
 
 
 def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
-    """(n, m): most of the target is within the anchor; in a room when it belongs to it."""
+    """(n, m) fit: most of the target's volume is within the anchor; for a room: the target belongs to it."""
     half = targets.size / 2
     low = np.maximum((targets.center - half)[:, None], anchors.low[None] - GROWN_M)
     high = np.minimum((targets.center + half)[:, None], anchors.high[None] + GROWN_M)
@@ -82,7 +82,7 @@ def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
     raised = np.clip((targets.low[:, None, 2] - anchors.low[None, :, 2]) / (RAISED * anchors.size[None, :, 2]), 0, 1)
     share = np.where(legs, share * raised, share)
     fit = np.where(legs, fit * raised, fit)
-    rooms = np.array([bool(one) and one[0] == "R" for one in anchors.ids], bool)
+    rooms = np.array([bool(node_id) and node_id[0] == "R" for node_id in anchors.ids], bool)
     same = targets.room[:, None] == anchors.room[None]
     return np.where(rooms[None] & (anchors.room >= 0)[None], same.astype(float), np.where(share > 0.95, 1.0, fit))
 
@@ -95,70 +95,70 @@ def _is_open_below(label: str) -> bool:
     return label.rsplit(" ", 2)[-2] in OPEN_BELOW if " " in label else False
 
 
-def judge(case: Case) -> Fits:
+def evaluate(query: RelationQuery) -> PairFits:
     """All pairs. "In" also holds for what lies on top (books in a shelf, a cup in the sink)."""
-    targets, anchors = case.targets, case.anchors
+    targets, anchors = query.targets, query.anchors
     assert anchors is not None
-    gaps = gaps_m(targets, anchors)
-    name = case.relation
+    gaps = axis_gaps_m(targets, anchors)
+    name = query.relation
     if name == "on":
-        # "on" is said of a cup in a cupboard's box too: shelves, racks, counters with a wall behind
+        # a cup within the box of a shelf, rack or counter with a back wall is "on" it, too
         values = np.maximum(on_fit(targets, anchors, gaps), WITHIN_SHARE * in_fit(targets, anchors, gaps))
-        values = _on_shells(targets, anchors, gaps, values)
+        values = _with_room_parts(targets, anchors, gaps, values)
     elif name == "in":
         values = np.maximum(in_fit(targets, anchors, gaps), ON_SHARE * on_fit(targets, anchors, gaps))
-        values = _on_shells(targets, anchors, gaps, values)
+        values = _with_room_parts(targets, anchors, gaps, values)
     elif name == "under":
         values = under_fit(targets, anchors, gaps)
     elif name == "above":
         values = under_fit(anchors, targets, gaps.swapaxes(0, 1)).T
     else:
-        values = _carries(targets, anchors, gaps)
+        values = _holds(targets, anchors, gaps)
         if name == "with":
-            gap = apart_m(gaps)
-            values = np.maximum(values, np.maximum(0.9 * halving(gap, PART_M), 0.7 * halving(gap, BESIDE_M)))
-    return Fits(values, lambda i, j: _sentence(case, i, j))
+            gap = distance_m(gaps)
+            values = np.maximum(values, np.maximum(0.9 * decay(gap, PART_M), 0.7 * decay(gap, BESIDE_M)))
+    return PairFits(values, lambda i, j: _sentence(query, i, j))
 
 
-def _on_shells(targets: Boxes, anchors: Boxes, gaps: F64, values: F64) -> F64:
-    """The fits (n, m) of "on" and "in" with those of walls, floors and corners that no map holds as objects."""
-    shell = np.array([not one for one in anchors.ids], bool)
-    wall, floor = shell & (anchors.size[:, 2] > 1.0), shell & (anchors.size[:, 2] <= FLOOR_M)
-    spot = shell & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
-    flat = flat_m(gaps)
+def _with_room_parts(targets: Boxes, anchors: Boxes, gaps: F64, values: F64) -> F64:
+    """The fits (n, m) of "on" and "in", replaced where the anchor is a wall, floor or corner of a room."""
+    is_room_part = np.array([not node_id for node_id in anchors.ids], bool)
+    is_wall, is_floor = is_room_part & (anchors.size[:, 2] > 1.0), is_room_part & (anchors.size[:, 2] <= FLOOR_M)
+    is_spot = is_room_part & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
+    aside_m = horizontal_distance_m(gaps)
     off = targets.low[:, None, 2] - anchors.low[None, :, 2] > OFF_GROUND_M
     above = targets.low[:, None, 2] - anchors.high[None, :, 2] - FLOOR_M
-    values = np.where(wall[None], HANGS_SHARE * halving(flat, WALL_M) * off, values)
-    values = np.where(floor[None], halving(above, CONTACT_M) * (flat <= 0), values)
-    return np.where(spot[None], halving(flat, CORNER_M), values)
+    values = np.where(is_wall[None], HANGS_SHARE * decay(aside_m, WALL_M) * off, values)
+    values = np.where(is_floor[None], decay(above, CONTACT_M) * (aside_m <= 0), values)
+    return np.where(is_spot[None], decay(aside_m, CORNER_M), values)
 
 
-def _carries(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+def _holds(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
     turned = gaps.swapaxes(0, 1)
     return np.maximum(on_fit(anchors, targets, turned), in_fit(anchors, targets, turned)).T
 
 
-def _sentence(case: Case, i: int, j: int) -> str:
-    assert case.anchors is not None
-    one, other = case.targets.take([i]), case.anchors.take([j])
-    name = case.relation
+def _sentence(query: RelationQuery, i: int, j: int) -> str:
+    assert query.anchors is not None
+    subject, support = query.targets.take([i]), query.anchors.take([j])
+    name = query.relation
     if name in ("holds", "with"):
-        one, other = other, one
-    gaps = gaps_m(one, other)
-    over = float(share_over(one, other, gaps, smaller=name in ("under", "above"))[0, 0])
-    a, b = one.labels[0], other.labels[0]
+        subject, support = support, subject
+    gaps = axis_gaps_m(subject, support)
+    over = float(footprint_overlap(subject, support, gaps, smaller=name in ("under", "above"))[0, 0])
+    a, b = subject.labels[0], support.labels[0]
     if name in ("under", "above"):
-        rise = float(one.center[0, 2] - other.center[0, 2])
+        rise = float(subject.center[0, 2] - support.center[0, 2])
         word = "higher" if rise > 0 else "lower"
-        aside = float(flat_m(gaps)[0, 0])
+        aside = float(horizontal_distance_m(gaps)[0, 0])
         beside = f"{over:.0%} of it {'over' if rise > 0 else 'under'} it" if over else f"{aside:.2f} m aside"
         return f"{a} is {abs(rise):.2f} m {word} than {b}, {beside}"
-    inside = float(in_fit(one, other, gaps)[0, 0])
+    inside = float(in_fit(subject, support, gaps)[0, 0])
     if name == "in" and inside >= 0.5:
         return f"{a} is within {b}"
-    gap = float(one.low[0, 2] - other.high[0, 2])
+    gap = float(subject.low[0, 2] - support.high[0, 2])
     if name == "with" and over < 0.1:
-        return f"{a} is {float(apart_m(gaps)[0, 0]):.2f} m from {b}"
+        return f"{a} is {float(distance_m(gaps)[0, 0]):.2f} m from {b}"
     level = f"{abs(gap):.2f} m {'above' if gap > 0 else 'below'}" if abs(gap) >= 0.005 else "level with"
     return f"the bottom of {a} is {level} the top of {b}, {over:.0%} of it over it"
 
@@ -175,5 +175,5 @@ RELATION = Relation(
         "holds": ("holding", "containing", "contains", "carrying"),
         "with": ("with", "that has", "which has", "that have"),
     },
-    judge=judge,
+    evaluate=evaluate,
 )  # fmt: skip

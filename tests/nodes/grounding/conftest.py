@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.runtime.messages import Graph, Question
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 
@@ -151,7 +151,7 @@ def ask():
 
 @pytest.fixture(scope="session")
 def names():
-    return Names(TextEncoder().encode)
+    return NameMatcher(TextEncoder().encode)
 
 
 @pytest.fixture(scope="session")

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.anchor_matching import Anchors, related
+from placegraph.nodes.grounding.anchor_matching import Anchors, match_anchors
 from placegraph.nodes.grounding.box_arrays import layout_of
-from placegraph.nodes.grounding.program_syntax import read
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.program_syntax import parse_program
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 
 
 @pytest.fixture
@@ -18,8 +18,8 @@ def relate(room_of):
         )
         targets, rest = layout.all.take(range(len(xs))), layout.all.take(range(len(xs), len(spots)))
         anchors = Anchors(rest, np.array(weights or [1.0] * len(others)), count=count)
-        said = next(iter(read(f"cup; {condition}").conditions))
-        return related(said, targets, [anchors], layout, Views(layout, np.full(3, np.nan)))
+        said = next(iter(parse_program(f"cup; {condition}").conditions))
+        return match_anchors(said, targets, [anchors], layout, ViewpointSelector(layout, np.full(3, np.nan)))
 
     return make
 
@@ -57,6 +57,8 @@ def test_between_two_of_a_kind(relate):
 def test_a_thing_is_not_its_own_anchor(house, names):
     layout = layout_of(house)
     lamps = layout.all.take([layout.row[i] for i in ("O11", "O18")])
-    said = next(iter(read("lamp; closest (one)").conditions))
-    outcome = related(said, lamps, [Anchors(lamps, np.ones(2))], layout, Views(layout, np.full(3, np.nan)))
+    said = next(iter(parse_program("lamp; closest (one)").conditions))
+    outcome = match_anchors(
+        said, lamps, [Anchors(lamps, np.ones(2))], layout, ViewpointSelector(layout, np.full(3, np.nan))
+    )
     assert "from lamp O18, in another room" in outcome.sentence(0)

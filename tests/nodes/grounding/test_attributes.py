@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.attributes import BASIC_COLORS, UNKNOWN_FIT, color_fit, look, size_fit
+from placegraph.nodes.grounding.attributes import BASIC_COLORS, UNKNOWN_FIT, appearance_fits, color_fit, size_fit
 from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
@@ -34,7 +34,7 @@ def boxes_of(nodes):
 
 
 def fits(words, *nodes):
-    return look(words, nodes, boxes_of(nodes), np.ones(len(nodes), bool))
+    return appearance_fits(words, nodes, boxes_of(nodes), np.ones(len(nodes), bool))
 
 
 def test_size_is_a_rank(thing_of):

@@ -1,13 +1,13 @@
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import joined, layout_of
+from placegraph.nodes.grounding.box_arrays import concatenate, layout_of
 from placegraph.runtime.scene_graph import SceneGraph
 
 
 def test_a_building_alone_has_no_things_and_is_the_room_of_all(node_of):
     layout = layout_of(SceneGraph.of([node_of("B0", "", "", (0, 0, 0), (4, 2, 3))]))
     assert (len(layout.all), layout.rooms, layout.room_center(np.array([-1])).tolist()) == (0, (), [[2.0, 1.0]])
-    assert layout.shell("wall").labels == ("a wall of room B0",) * 4
+    assert layout.room_parts("wall").labels == ("a wall of room B0",) * 4
 
 
 def test_rows_are_objects_then_places(house):
@@ -22,10 +22,10 @@ def test_rows_are_objects_then_places(house):
 
 def test_what_rooms_consist_of(house):
     layout = layout_of(house)
-    assert [len(layout.shell(kind)) for kind in ("room", "floor", "ceiling", "center", "wall", "corner")] == [
+    assert [len(layout.room_parts(kind)) for kind in ("room", "floor", "ceiling", "center", "wall", "corner")] == [
         3, 3, 3, 3, 12, 12,
     ]  # fmt: skip
-    floor, wall, corner = layout.shell("floor"), layout.shell("wall"), layout.shell("corner")
+    floor, wall, corner = layout.room_parts("floor"), layout.room_parts("wall"), layout.room_parts("corner")
     assert floor.high[2].tolist() == [4, 4, 2.8]
     assert wall.high[0, 0] == 0 and wall.low[1, 0] == 4
     assert corner.size[0].tolist() == [0.01, 0.01, 2.5]
@@ -34,7 +34,7 @@ def test_what_rooms_consist_of(house):
 
 def test_some_and_all_of_several(house):
     things = layout_of(house).all
-    both = joined([things.take([1]), things.take([0, 2])])
+    both = concatenate([things.take([1]), things.take([0, 2])])
     assert both.ids == ("O1", "O0", "O2")
     assert np.array_equal(both.center, things.center[[1, 0, 2]])
     assert len(things.take([])) == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding.program import CONDITIONS, MAX_DEPTH, Condition, Program, Thing
-from placegraph.nodes.grounding.program_executor import Grounder
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.runtime.scene_graph import SceneGraph
 
 NOUNS = (
@@ -45,7 +45,7 @@ def test_any_program_on_any_map(maps, names, seed):
     for _ in range(60):
         graph, program = luck.choice(maps), Program(target=random_thing(luck))
         asker = np.array([luck.uniform(0, 5), luck.uniform(0, 5), 1.5]) if luck.random() < 0.3 else np.full(3, np.nan)
-        first, again = (Grounder(graph, names, asker).rank(program) for _ in range(2))
+        first, again = (ProgramExecutor(graph, names, asker).rank(program) for _ in range(2))
         assert first == again
         for candidate in first.candidates:
             assert candidate.node.id in graph.nodes

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding.edge_descriptions import edges
-from placegraph.nodes.grounding.program_executor import Grounder
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.runtime.scene_graph import SceneGraph, Tag
 
 
@@ -13,7 +13,7 @@ def seen_from(names):
     """A grounder of a graph, and where its asker stands."""
 
     def make(graph, at=(np.nan,) * 3):
-        return Grounder(graph, names, np.array(at, float))
+        return ProgramExecutor(graph, names, np.array(at, float))
 
     return make
 

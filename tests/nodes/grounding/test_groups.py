@@ -3,7 +3,7 @@ import pytest
 
 from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.nodes.grounding.groups import group_fits
-from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.program_syntax import parse_program
 
 
 @pytest.fixture
@@ -11,7 +11,7 @@ def fits(room_of):
     def make(condition, *xs):
         layout = layout_of(room_of(*(("cup", (x, 0, 0), (0.2, 0.2, 0.2)) for x in xs), ("end", (99, 0, 0), (1, 1, 1))))
         things = layout.all.take(range(len(xs)))
-        return group_fits(things, np.arange(len(xs)), next(iter(read(f"cup; {condition}").conditions)))
+        return group_fits(things, np.arange(len(xs)), next(iter(parse_program(f"cup; {condition}").conditions)))
 
     return make
 

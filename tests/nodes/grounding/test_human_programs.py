@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from placegraph.nodes.grounding.llm_parser import default_adapter_path, read_request
-from placegraph.nodes.grounding.program import ANYTHING, SAME_KIND, Thing, normal
-from placegraph.nodes.grounding.program_syntax import NEVER_FIRST, read, write
+from placegraph.nodes.grounding.llm_parser import default_adapter_path, parse_by_model
+from placegraph.nodes.grounding.program import ANYTHING, SAME_KIND, Thing, normalized
+from placegraph.nodes.grounding.program_syntax import NEVER_FIRST, format_program, parse_program
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.language.word_forms import tokens
 
@@ -35,8 +35,8 @@ def test_every_fourth_request_is_labelled_once():
 
 @pytest.mark.parametrize(("line", "program"), PROGRAMS)
 def test_each_is_a_program_that_the_grammar_allows(line, program):
-    target = read(program)
-    assert write(target) == program
+    target = parse_program(program)
+    assert format_program(target) == program
     for thing in things(target):
         for condition in thing.conditions:
             assert condition.number <= 9
@@ -45,7 +45,7 @@ def test_each_is_a_program_that_the_grammar_allows(line, program):
 
 @pytest.mark.parametrize("label", LABELS, ids=lambda label: str(label["line"]))
 def test_alternatives_are_different_programs(label):
-    forms = [normal(read(program)) for program in label["programs"]]
+    forms = [normalized(parse_program(program)) for program in label["programs"]]
     assert forms and len(set(forms)) == len(forms)
 
 
@@ -56,7 +56,7 @@ def test_nouns_and_words_are_the_requests_own():
     strange = []
     for line, program in PROGRAMS:
         words = tokens(sentences[line])
-        for thing in things(read(program)):
+        for thing in things(parse_program(program)):
             nouns = [] if thing.noun in (ANYTHING, SAME_KIND) else [thing.noun]
             spans = nouns + [condition.words for condition in thing.conditions if condition.words]
             strange += [(line, span) for span in spans if not follow_each_other(span, words)]
@@ -72,8 +72,8 @@ def test_the_packaged_reader_reads_people():
     model = LanguageModel(adapter_path=default_adapter_path())
     exact = noun = 0
     for label in LABELS:
-        found = normal(read_request(model, sentences[label["line"]]).thing)
-        right = [normal(read(program)) for program in label["programs"]]
+        found = normalized(parse_by_model(model, sentences[label["line"]]).thing)
+        right = [normalized(parse_program(program)) for program in label["programs"]]
         exact += found in right
         noun += found.noun in {one.noun for one in right}
     model.close()

@@ -27,10 +27,10 @@ class Counting(LanguageModel):
         super().__init__(n_ctx=n_ctx)
         self.reply, self.asked = reply, []
 
-    def complete(self, text, grammar, max_tokens, prefix="", suffix=""):
+    def complete(self, text, program_grammar, max_tokens, prefix="", suffix=""):
         assert self.fits(prefix, text, max_tokens, suffix)
         assert len(json.dumps(self.reply)) <= max_tokens
-        self.asked.append((prefix + text + suffix, grammar))
+        self.asked.append((prefix + text + suffix, program_grammar))
         return Completion(json.dumps(self.reply), 0.0)
 
 

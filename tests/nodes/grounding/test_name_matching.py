@@ -10,15 +10,15 @@ from placegraph.nodes.grounding.name_matching import (
     SHARED,
     SLIP,
     SYNONYM,
-    is_slip,
+    is_misspelling,
 )
 
 
 def test_nothing_is_like_nothing(names):
-    assert names.likeness("", "chair") == 0
-    assert names.likeness("chair", "") == 0
-    assert names.named("chair", []) == []
-    assert names.nearest("chair", []) == []
+    assert names.similarity("", "chair") == 0
+    assert names.similarity("chair", "") == 0
+    assert names.best_matches("chair", []) == []
+    assert names.nearest_names("chair", []) == []
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_nothing_is_like_nothing(names):
      ("table", "tablecloth", 0)],
 )  # fmt: skip
 def test_likeness(names, noun, tag, score):
-    assert names.likeness(noun, tag) == score
+    assert names.similarity(noun, tag) == score
 
 
 OTHER_KIND = [
@@ -57,22 +57,22 @@ def test_the_cosine_threshold_parts_the_pairs(names):
 
 
 def test_an_id_names_its_node(names, house):
-    assert [fit.node.id for fit in names.named("o14", house.layer("object"))] == ["O14"]
-    assert names.named("o999", house.layer("object")) == []
+    assert [fit.node.id for fit in names.best_matches("o14", house.layer("object"))] == ["O14"]
+    assert names.best_matches("o999", house.layer("object")) == []
 
 
 def test_weak_second_tags_count_less_and_slips_not_at_all(names, thing_of):
     second = thing_of(0, "R0", "stool", (0, 0, 0), (1, 1, 1), others=[("lamp", 3.0)])
     slip = thing_of(1, "R0", "stool", (0, 0, 0), (1, 1, 1), others=[("lamp", 0.5)])
     untagged = thing_of(2, "R0", "", (0, 0, 0), (1, 1, 1))
-    assert [(fit.node.id, round(fit.score, 3)) for fit in names.named("lamp", [second, slip, untagged])] == [
+    assert [(fit.node.id, round(fit.score, 3)) for fit in names.best_matches("lamp", [second, slip, untagged])] == [
         ("O0", 0.8)
     ]
 
 
 def test_nearest_names(names, house):
-    assert names.nearest("carpet", house.layer("object"), 30)[0] != ""
-    assert names.nearest("refrigerators", house.layer("object"))[0] == "fridge"
+    assert names.nearest_names("carpet", house.layer("object"), 30)[0] != ""
+    assert names.nearest_names("refrigerators", house.layer("object"))[0] == "fridge"
 
 
 @pytest.mark.parametrize(
@@ -83,12 +83,17 @@ def test_nearest_names(names, house):
      ("board", "boards", False), ("chairs", "chair", True), ("", "chair", False)],
 )  # fmt: skip
 def test_slips_of_spelling(noun, word, slip):
-    assert is_slip(noun, word) == slip
+    assert is_misspelling(noun, word) == slip
 
 
 def test_what_is_fairly_called_so_is_taken_where_nothing_is(names, house):
     objects = house.layer("object")
-    fair = names.fair("sofas", objects)
+    fair = names.nearest_matches("sofas", objects)
     assert {fit.node.name for fit in fair} == {"sofa"}
     assert all(fit.score >= FAIR for fit in fair)
-    assert names.fair("zebra", objects) == names.fair("", objects) == names.fair("o3", objects) == []
+    assert (
+        names.nearest_matches("zebra", objects)
+        == names.nearest_matches("", objects)
+        == names.nearest_matches("o3", objects)
+        == []
+    )

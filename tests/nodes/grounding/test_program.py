@@ -1,8 +1,8 @@
 import pytest
 from pydantic import ValidationError
 
-from placegraph.nodes.grounding.program import CONDITIONS, Condition, Thing, normal
-from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.program import CONDITIONS, Condition, Thing, normalized
+from placegraph.nodes.grounding.program_syntax import parse_program
 
 
 @pytest.mark.parametrize(
@@ -23,11 +23,11 @@ def test_a_condition_holds_what_its_form_says(fields):
 
 
 def test_readings_are_the_same_whatever_the_order_number_of_words_and_first_rank():
-    one = normal(read("pillows; is grey; leftmost 1; between (beds; is big, desk)"))
-    other = normal(read("pillow; between (desk, bed; is big); leftmost; is gray"))
+    one = normalized(parse_program("pillows; is grey; leftmost 1; between (beds; is big, desk)"))
+    other = normalized(parse_program("pillow; between (desk, bed; is big); leftmost; is gray"))
     assert one == other
-    assert one != normal(read("pillow; between (desk, bed); leftmost; is gray"))
-    assert normal(read("pillow; leftmost 2")) != normal(read("pillow; leftmost"))
+    assert one != normalized(parse_program("pillow; between (desk, bed); leftmost; is gray"))
+    assert normalized(parse_program("pillow; leftmost 2")) != normalized(parse_program("pillow; leftmost"))
 
 
 def test_each_form_has_a_meaning_and_room_for_what_it_must_hold():

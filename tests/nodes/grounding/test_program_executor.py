@@ -2,19 +2,19 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding.program import Program
-from placegraph.nodes.grounding.program_executor import Grounder
-from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
+from placegraph.nodes.grounding.program_syntax import parse_program
 from placegraph.runtime.scene_graph import SceneGraph
 
 NOWHERE = np.full(3, np.nan)
 
 
-def ranked(graph, names, text, asker=NOWHERE, heading=np.nan):
-    return Grounder(graph, names, asker, heading).rank(Program(target=read(text)))
+def ranking_of(graph, names, text, asker=NOWHERE, heading=np.nan):
+    return ProgramExecutor(graph, names, asker, heading).rank(Program(target=parse_program(text)))
 
 
 def best(graph, names, text, **kwargs):
-    candidates = ranked(graph, names, text, **kwargs).candidates
+    candidates = ranking_of(graph, names, text, **kwargs).candidates
     return candidates[0].node.id if candidates else None
 
 
@@ -81,7 +81,7 @@ def test_a_room_without_rooms_colours_and_viewer(office, names, program, expecte
      ("desk; is open; with (telephone)", "open"), ("desk; with (telephone); looking (piano)", "piano")],
 )  # fmt: skip
 def test_what_the_map_has_no_evidence_for_decides_nothing_and_is_said(office, names, program, doubt):
-    ranking = ranked(office, names, program)
+    ranking = ranking_of(office, names, program)
     assert ranking.candidates[0].node.id == "O5"
     assert not ranking.sure
     assert any(doubt in note for note in ranking.notes)
@@ -95,7 +95,7 @@ def test_a_wrong_inner_condition_does_not_kill_the_right_answer(office, names):
 def test_empty_map_gives_no_candidates(names, node_of):
     graph = SceneGraph.of([node_of("B0", "", "building", (0, 0, 0), (1, 1, 1))])
     for text in ("cup", "thing; largest", "cup; leftmost", "cup; near (wall)", "cup; alone; count 2; middle"):
-        assert ranked(graph, names, text).candidates == []
+        assert ranking_of(graph, names, text).candidates == []
 
 
 def test_an_object_in_no_room_has_the_building_for_one(names, node_of, room_of):
@@ -105,12 +105,12 @@ def test_an_object_in_no_room_has_the_building_for_one(names, node_of, room_of):
 
 def test_viewpoint_is_said_or_the_askers_or_the_room(names, house):
     asker = np.array([1.0, 2.0, 1.5])
-    assert Grounder(house, names, asker).viewpoint(house.nodes["O9"]).source == "asker"
-    view = Grounder(house, names, NOWHERE).viewpoint(house.nodes["O9"])
-    assert (view.source, view.xyz_world.tolist()) == ("room centre", [6.5, 2.5, 1.25])
-    grounder = Grounder(house, names, asker)
-    grounder.rank(Program(target=read("vase; leftmost; from (tv)")))
-    assert grounder.viewpoint(house.nodes["O9"]).source == "tv O10"
+    assert ProgramExecutor(house, names, asker).viewpoint(house.nodes["O9"]).source == "asker"
+    viewpoint = ProgramExecutor(house, names, NOWHERE).viewpoint(house.nodes["O9"])
+    assert (viewpoint.source, viewpoint.xyz_world.tolist()) == ("room centre", [6.5, 2.5, 1.25])
+    executor = ProgramExecutor(house, names, asker)
+    executor.rank(Program(target=parse_program("vase; leftmost; from (tv)")))
+    assert executor.viewpoint(house.nodes["O9"]).source == "tv O10"
 
 
 def test_of_several_doors_the_one_that_the_asker_stands_at_is_meant(names, room_of):
@@ -135,16 +135,16 @@ def test_a_front_gives_left_and_right_of_who_faces_it(names, room_of):
     things = ("sofa", (3, 0.5, 0.4), (2, 0.9, 0.8)), ("lamp", (1.2, 0.5, 0.5), (0.3, 0.3, 1.0))
     graph = room_of(*things, ("lamp", (4.8, 0.5, 0.5), (0.3, 0.3, 1.0)), fronts={0: (0.0, 1.0)})
     assert best(graph, names, "lamp; left (sofa)") == "O2"  # it faces north, so who faces it looks south
-    assert ranked(graph, names, "lamp; left (sofa)").candidates[0].evidence[-1].endswith("front of sofa O0")
+    assert ranking_of(graph, names, "lamp; left (sofa)").candidates[0].evidence[-1].endswith("front of sofa O0")
     assert best(graph, names, "lamp; left (sofa)", asker=np.array([3.0, -3.0, 1.5])) == "O1"
 
 
 def test_level_candidates_are_tied_in_the_order_of_their_ids(names, house):
-    assert [c.node.id for c in ranked(house, names, "nightstand").tied()] == ["O16", "O17"]
+    assert [c.node.id for c in ranking_of(house, names, "nightstand").tied()] == ["O16", "O17"]
 
 
 def test_a_condition_that_fails_is_said(names, house):
-    ranking = ranked(house, names, "cup; on (bed)")
+    ranking = ranking_of(house, names, "cup; on (bed)")
     assert not ranking.sure
     assert not ranking.candidates[0].holds
     assert ranking.candidates[0].evidence[-1].startswith("not as said: ")
@@ -156,7 +156,7 @@ def test_superlatives_look_among_those_that_fit(names, house):
 
 def test_of_anything_only_what_is_there_is_an_answer(names, house):
     assert best(house, names, "thing; under (cup; is white)") == "O0"
-    assert ranked(house, names, "thing; on (vase)").candidates == []
+    assert ranking_of(house, names, "thing; on (vase)").candidates == []
 
 
 def test_a_name_that_one_bears_is_not_all_when_more_is_said(names, house):
@@ -168,5 +168,5 @@ def test_a_name_that_one_bears_is_not_all_when_more_is_said(names, house):
 def test_the_nearest_name_is_an_answer_with_doubt(names, room_of):
     graph = room_of(("refrigerator", (1, 1, 1), (0.7, 0.7, 1.8)), ("towel", (3, 1, 1), (0.3, 0.1, 0.5)))
     for noun in ("refridgerator", "fridge", "towell"):  # slips of spelling and other words
-        assert ranked(graph, names, noun).sure
-    assert ranked(graph, names, "submarine").candidates == []
+        assert ranking_of(graph, names, noun).sure
+    assert ranking_of(graph, names, "submarine").candidates == []

@@ -4,7 +4,7 @@ import llama_cpp
 import pytest
 
 from placegraph.nodes.grounding.program import MAX_DEPTH
-from placegraph.nodes.grounding.program_syntax import grammar, read, write
+from placegraph.nodes.grounding.program_syntax import format_program, parse_program, program_grammar
 from placegraph.runtime.errors import QueryError
 
 PROGRAMS = (
@@ -18,7 +18,7 @@ PROGRAMS = (
 
 @pytest.mark.parametrize("text", PROGRAMS)
 def test_what_is_read_is_written_alike(text):
-    assert write(read(text)) == text
+    assert format_program(parse_program(text)) == text
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ def test_what_is_read_is_written_alike(text):
 )
 def test_a_damaged_program_is_named_with_what_was_expected(text, says):
     with pytest.raises(QueryError, match="program") as error:
-        read(text)
+        parse_program(text)
     assert says in str(error.value)
 
 
@@ -69,7 +69,7 @@ def _packaged():
 
 
 def test_the_grammar_allows_programs_of_the_requests_own_words_and_no_others():
-    rules = grammar("Facing the wall with 2 desks: the big trash can to the left of the lamp, upstairs")
+    rules = program_grammar("Facing the wall with 2 desks: the big trash can to the left of the lamp, upstairs")
     assert _allows(rules, " trash can; is big; left (lamp); looking (wall; with (desks; count 2)); floor (upstairs)\n")
     assert not _allows(rules, " chair; is big\n")
     assert not _allows(rules, " trash can; is red\n")
@@ -81,4 +81,4 @@ def test_the_grammar_allows_programs_of_the_requests_own_words_and_no_others():
 
 def test_a_request_without_a_word_has_no_grammar():
     with pytest.raises(QueryError, match="Latin"):
-        grammar("床の上 ... ?!")
+        program_grammar("床の上 ... ?!")

@@ -6,7 +6,7 @@ import pytest
 
 from placegraph.nodes.grounding import NODE, GroundingConfig
 from placegraph.nodes.grounding.program import Program
-from placegraph.nodes.grounding.program_syntax import read
+from placegraph.nodes.grounding.program_syntax import parse_program
 from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.node import Context
@@ -69,7 +69,7 @@ def test_a_found_object(node, ask):
 def test_the_parse_is_in_the_answer(node, ask):
     parse = ask(node, "the red chair near the fridge")["parse"]
     assert (parse["text"], parse["reader"], parse["confidence"]) == ("chair; is red; near (fridge)", "rules", None)
-    assert Program.model_validate_json(json.dumps(parse["program"])).target == read(parse["text"])
+    assert Program.model_validate_json(json.dumps(parse["program"])).target == parse_program(parse["text"])
 
 
 def test_without_a_model_the_rules_read(node, ask):
@@ -78,7 +78,7 @@ def test_without_a_model_the_rules_read(node, ask):
 
 def test_a_program_that_is_given_is_executed(house, names, question_of):
     reasoner = Reasoner(names, LanguageModel(), (), use_model=False)
-    program = Program(target=read("lamp; on (nightstand)"))
+    program = Program(target=parse_program("lamp; on (nightstand)"))
     answer = reasoner.answer_program(house, 4, question_of("whatever"), program)
     assert (answer["object_id"], answer["revision"], answer["llm_calls"]) == ("O18", 4, 0)
     assert answer["parse"]["text"] == "lamp; on (nightstand)"

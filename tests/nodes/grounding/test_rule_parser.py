@@ -1,8 +1,8 @@
 import pytest
 
-from placegraph.nodes.grounding.program import normal
-from placegraph.nodes.grounding.program_syntax import read, write
-from placegraph.nodes.grounding.rule_parser import MAX_CHARS, draft
+from placegraph.nodes.grounding.program import normalized
+from placegraph.nodes.grounding.program_syntax import format_program, parse_program
+from placegraph.nodes.grounding.rule_parser import MAX_CHARS, parse_by_rules
 from placegraph.runtime.errors import QueryError
 
 PLACES = {"kitchen", "living room", "bedroom"}
@@ -10,7 +10,7 @@ THINGS = {"chair", "table", "lamp", "window", "vase", "cup", "fridge", "book", "
 
 
 def parsed(text):
-    return draft(text, PLACES.__contains__, THINGS.__contains__)
+    return parse_by_rules(text, PLACES.__contains__, THINGS.__contains__)
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_no_question(text, reason):
 
 
 def written(text):
-    return write(parsed(text).target)
+    return format_program(parsed(text).target)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def written(text):
 )
 def test_requests_as_programs(text, expected):
     assert written(text) == expected
-    assert normal(read(expected)) == normal(parsed(text).target)  # the text form can say it
+    assert normalized(parse_program(expected)) == normalized(parsed(text).target)  # the text form can say it
 
 
 def test_of_two_known_things_the_last_one_is_meant():

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding.program import Thing
-from placegraph.nodes.grounding.program_executor import Grounder
-from placegraph.nodes.grounding.program_syntax import read, write
-from placegraph.nodes.grounding.search_scope import floors_called
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
+from placegraph.nodes.grounding.program_syntax import format_program, parse_program
+from placegraph.nodes.grounding.search_scope import match_floors
 from placegraph.runtime.scene_graph import SceneGraph
 
 
@@ -13,14 +13,14 @@ def ids(nodes):
 
 
 def narrowed(graph, names, text):
-    return Grounder(graph, names, np.full(3, np.nan)).scope(read(text))
+    return ProgramExecutor(graph, names, np.full(3, np.nan)).scope(parse_program(text))
 
 
 def test_a_map_with_nothing_in_it(names, node_of):
     graph = SceneGraph.of([node_of("B0", "", "building", (0, 0, 0), (1, 1, 1))])
     scope = narrowed(graph, names, "cup; room (kitchen); floor (upstairs)")
     assert (scope.objects, scope.sure) == ([], False)
-    assert floors_called(graph, "first floor") == []
+    assert match_floors(graph, "first floor") == []
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_a_map_with_nothing_in_it(names, node_of):
      ("ground floor", ["F0"]), ("floor 2", ["F1"]), ("third floor", []), ("floor 7", [])],
 )  # fmt: skip
 def test_floors(house, words, expected):
-    assert ids(floors_called(house, words)) == expected
+    assert ids(match_floors(house, words)) == expected
 
 
 def test_rooms_locations_and_outside(names, house):
@@ -67,14 +67,14 @@ def test_a_room_is_told_by_what_it_holds_its_floor_and_its_order(names, node_of,
 
 def test_a_thing_that_one_can_be_in_is_left_to_geometry(names, house):
     for text in ("cup; room (fridge)", "cup; in (fridge)"):
-        assert write(narrowed(house, names, text).thing) == "cup; in (fridge)"
+        assert format_program(narrowed(house, names, text).thing) == "cup; in (fridge)"
 
 
 def test_a_room_without_a_node_is_where_its_typical_things_are(names, room_of):
     graph = room_of(("toilet", (1, 1, 0.4), (0.4, 0.6, 0.8)), ("bed", (5, 4, 0.3), (2, 2, 0.6)))
     scope = narrowed(graph, names, "mirror; not room (bathroom)")
-    assert write(Thing(noun="mirror", conditions=tuple(scope.hints))) == "mirror; not near (toilet)"
-    assert write(scope.thing) == "mirror"
+    assert format_program(Thing(noun="mirror", conditions=tuple(scope.hints))) == "mirror; not near (toilet)"
+    assert format_program(scope.thing) == "mirror"
     assert (scope.sure, len(scope.objects)) == (False, 2)
     assert "toilet" in scope.notes[0]
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding.box_arrays import layout_of
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 
 NOBODY = np.full(3, np.nan)
 CENTER = ("room centre", [3.0, 2.5])
@@ -20,65 +20,69 @@ def layout(room_of):
 
 
 def test_who_faces_a_thing_stands_square_before_it(layout):
-    views, things = Views(layout, NOBODY), layout.all
+    viewpoints, things = ViewpointSelector(layout, NOBODY), layout.all
     for row, forward in ((1, [-1, 0]), (2, [1, 0]), (3, [0, 1]), (4, [0, 1])):
-        assert np.allclose(views.square_on(things, row), forward), row
-        view = views.facing(things.take([row]))
-        assert np.allclose(view.forward, forward)
-        assert (things.center[row, :2] - view.eye) @ view.forward > 0.5
-    assert not views.square_on(things, 5).any()  # in the very middle of the room nothing says which side
+        assert np.allclose(viewpoints.facing_direction(things, row), forward), row
+        viewpoint = viewpoints.in_front_of(things.take([row]))
+        assert np.allclose(viewpoint.forward, forward)
+        assert (things.center[row, :2] - viewpoint.eye) @ viewpoint.forward > 0.5
+    assert not viewpoints.facing_direction(things, 5).any()  # in the very middle of the room nothing says which side
 
 
 def test_several_are_seen_towards_the_wall_that_most_are_on(layout):
-    views = Views(layout, NOBODY)
-    assert np.allclose(views.facing_most(layout.all.take([2, 3, 4])).forward, [0, 1])
-    assert np.allclose(views.over(layout.all.take([3, 4])).forward, [0, 1])
+    viewpoints = ViewpointSelector(layout, NOBODY)
+    assert np.allclose(viewpoints.in_front_of_most(layout.all.take([2, 3, 4])).forward, [0, 1])
+    assert np.allclose(viewpoints.overlooking(layout.all.take([3, 4])).forward, [0, 1])
 
 
 def test_the_order_of_preference(layout):
     tv = layout.all.take([2])
-    assert Views(layout, NOBODY).toward(tv).sources == ("room centre",)
-    asked = Views(layout, np.array([1.0, 1.0, 1.5]))
-    assert asked.toward(tv).sources == ("asker",)
-    asked.said = asked.at(layout.all.take([1]))
-    assert asked.toward(tv).sources == ("bed O1",)
-    assert asked.toward(tv).trust.tolist() == [1.0] > Views(layout, NOBODY).toward(tv).trust.tolist()
+    assert ViewpointSelector(layout, NOBODY).lines_of_sight(tv).sources == ("room centre",)
+    asked = ViewpointSelector(layout, np.array([1.0, 1.0, 1.5]))
+    assert asked.lines_of_sight(tv).sources == ("asker",)
+    asked.requested = asked.at(layout.all.take([1]))
+    assert asked.lines_of_sight(tv).sources == ("bed O1",)
+    assert (
+        asked.lines_of_sight(tv).trust.tolist()
+        == [1.0]
+        > ViewpointSelector(layout, NOBODY).lines_of_sight(tv).trust.tolist()
+    )
 
 
 def test_a_front_is_seen_by_who_faces_it(room_of):
     layout = layout_of(room_of(("desk", (0, 0, 0), (1, 1, 1)), ("cup", (5, 5, 0), (1, 1, 1)), fronts={0: (-1.0, 0.0)}))
-    lines = Views(layout, NOBODY).toward(layout.all.take([0]))
+    lines = ViewpointSelector(layout, NOBODY).lines_of_sight(layout.all.take([0]))
     assert lines.forward.tolist() == [[1.0, 0.0]]
     assert lines.left.tolist() == [[0.0, 1.0]]
     assert lines.sources == ("front of desk O0",)
 
 
 def test_away_from_a_thing_is_the_way_opposite_to_facing_it(layout):
-    views, tv = Views(layout, NOBODY), layout.all.take([2])
-    assert np.allclose(views.away(tv).forward, -views.facing(tv).forward)
+    viewpoints, tv = ViewpointSelector(layout, NOBODY), layout.all.take([2])
+    assert np.allclose(viewpoints.with_back_to(tv).forward, -viewpoints.in_front_of(tv).forward)
 
 
 def test_of_several_doors_each_room_has_its_own(house):
     layout = layout_of(house)
-    views = Views(layout, NOBODY)
+    viewpoints = ViewpointSelector(layout, NOBODY)
     windows = layout.all.take([layout.row[i] for i in ("O8", "O14", "O20")])
-    views.said = views.at(windows)
+    viewpoints.requested = viewpoints.at(windows)
     things = layout.all.take([layout.row[i] for i in ("O0", "O9", "O15")])
-    assert views.toward(things).sources == ("window O8", "window O14", "window O20")
+    assert viewpoints.lines_of_sight(things).sources == ("window O8", "window O14", "window O20")
 
 
 def test_a_room_without_a_door_of_its_own_is_seen_by_the_asker(house):
     layout = layout_of(house)
     bed = layout.all.take([layout.row["O15"]])
     for asker, source, trust in ((NOBODY, "sofa O9", 0.5), (np.array([1.0, 1, 4]), "asker", 1.0)):
-        views = Views(layout, asker)
-        views.said = views.at(layout.all.take([layout.row["O9"]]))
-        lines = views.toward(bed)  # the sofa is downstairs in another room
+        viewpoints = ViewpointSelector(layout, asker)
+        viewpoints.requested = viewpoints.at(layout.all.take([layout.row["O9"]]))
+        lines = viewpoints.lines_of_sight(bed)  # the sofa is downstairs in another room
         assert (lines.sources, lines.trust.tolist()) == ((source,), [trust])
 
 
 def test_nothing_is_seen_without_error(layout):
-    views = Views(layout, NOBODY)
+    viewpoints = ViewpointSelector(layout, NOBODY)
     nothing = layout.all.take([])
-    assert len(views.toward(nothing).sources) == 0
-    assert views.over(nothing).forward is not None
+    assert len(viewpoints.lines_of_sight(nothing).sources) == 0
+    assert viewpoints.overlooking(nothing).forward is not None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.grounding.program import Program
-from placegraph.nodes.grounding.program_syntax import read, write
+from placegraph.nodes.grounding.program_syntax import format_program, parse_program
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.evaluate.grounding_command import variant_scores
 from placegraph.tools.evaluate.grounding_variants import (
@@ -24,13 +24,13 @@ def scene():
 
 
 def program(text):
-    return Program(target=read(text))
+    return Program(target=parse_program(text))
 
 
 def test_parts_are_taken_from_a_program() -> None:
     whole = program("lamp; is red; on (table; near (door)); leftmost; room (kitchen); floor (upstairs)")
-    assert write(without_relations(whole).target) == "lamp; room (kitchen); floor (upstairs)"
-    assert write(without_places(whole).target) == "lamp; is red; on (table; near (door)); leftmost"
+    assert format_program(without_relations(whole).target) == "lamp; room (kitchen); floor (upstairs)"
+    assert format_program(without_places(whole).target) == "lamp; is red; on (table; near (door)); leftmost"
 
 
 def test_a_flat_graph_has_the_same_objects_in_one_room(scene) -> None:
@@ -40,8 +40,8 @@ def test_a_flat_graph_has_the_same_objects_in_one_room(scene) -> None:
 
 
 def test_the_true_program_gives_the_right_object_and_its_box(scene) -> None:
-    asker = VariantRunner()
-    replies = [asker.ask("oracle", scene, asked) for asked in scene.questions]
+    runner = VariantRunner()
+    replies = [runner.ask("oracle", scene, asked) for asked in scene.questions]
     scores = variant_scores([scene], [replies])
     assert scores["all"]["questions"] == 6
     right = np.mean([reply.object_id == f"O{one.target}" for reply, one in zip(replies, scene.questions, strict=True)])
@@ -50,12 +50,12 @@ def test_the_true_program_gives_the_right_object_and_its_box(scene) -> None:
 
 
 def test_each_variant_answers(scene) -> None:
-    asker = VariantRunner()
+    runner = VariantRunner()
     for variant in VARIANTS:
-        reply = asker.ask(variant, scene, scene.questions[0])
+        reply = runner.ask(variant, scene, scene.questions[0])
         assert reply.status in ("found", "not_in_map"), variant
         assert (reply.calls > 0) == (variant not in ("oracle", "rules")), variant
-    asker.model.close()
+    runner.model.close()
 
 
 def test_wrong_arguments_are_named(cli) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.name_matching import Names
+from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.program import Program
-from placegraph.nodes.grounding.program_executor import Grounder
-from placegraph.nodes.grounding.program_syntax import read, write
+from placegraph.nodes.grounding.program_executor import ProgramExecutor
+from placegraph.nodes.grounding.program_syntax import format_program, parse_program
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.simulator.ground_truth_graph import ground_truth_graph
 from placegraph.tools.simulator.house_frames import generate_house
@@ -49,8 +49,11 @@ def test_every_item_is_an_object_at_its_place() -> None:
 
 def test_every_question_has_a_program_of_its_own_words() -> None:
     for one in asked():
-        assert write(read(one.program)) == one.program
-        nouns = [read(one.program).noun, *(inner.noun for c in read(one.program).conditions for inner in c.things)]
+        assert format_program(parse_program(one.program)) == one.program
+        nouns = [
+            parse_program(one.program).noun,
+            *(inner.noun for c in parse_program(one.program).conditions for inner in c.things),
+        ]
         assert all(noun in one.text.lower() for noun in nouns), (one.text, one.program)
 
 
@@ -64,19 +67,19 @@ def test_forms_mean_what_they_say(form: str, part: str) -> None:
     assert programs and all(part in program for program in programs)
     for one in (one for one in asked() if one.form in ("two anchors", "chain", "between")):
         anchors = {house().items[k].item.name for k in one.anchors}
-        conditions = [*read(one.program).conditions]
+        conditions = [*parse_program(one.program).conditions]
         inner = [c for outer in conditions for thing in outer.things for c in thing.conditions]
         nouns = {thing.noun for c in (*conditions, *inner) for thing in c.things if c.name != "room"}
         assert len(nouns) >= min(len(anchors), 2), one.program
-    views = [one for one in asked() if "from (" in one.program]
-    assert views and all("from the door" in one.text.lower() for one in views)
+    viewpoints = [one for one in asked() if "from (" in one.program]
+    assert viewpoints and all("from the door" in one.text.lower() for one in viewpoints)
 
 
 def test_programs_find_their_answers() -> None:
-    names, graph = Names(TextEncoder().encode), ground_truth_graph(house())
+    names, graph = NameMatcher(TextEncoder().encode), ground_truth_graph(house())
     right = 0
     for one in asked():
         eye = np.full(3, np.nan) if one.viewpoint is None else one.viewpoint
-        ranking = Grounder(graph, names, eye).rank(Program(target=read(one.program)))
+        ranking = ProgramExecutor(graph, names, eye).rank(Program(target=parse_program(one.program)))
         right += bool(ranking.candidates) and ranking.candidates[0].node.id == f"O{one.target}"
     assert right >= 0.95 * len(asked())

@@ -3,7 +3,7 @@ import re
 import pytest
 
 from placegraph.nodes.grounding.program import CONDITIONS
-from placegraph.nodes.grounding.program_syntax import grammar, read, write
+from placegraph.nodes.grounding.program_syntax import format_program, parse_program, program_grammar
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.tools.training.request_grammar import examples
 from placegraph.tools.training.request_grammar.phrase_grammar import PhraseGrammar, is_held_out
@@ -23,14 +23,14 @@ def test_each_example_is_the_same_whatever_is_drawn_beside_it(coarse_mask):
 
 def test_programs_are_of_the_requests_own_words(coarse_mask):
     for example in coarse_mask[:300]:
-        assert write(read(example.program)) == example.program
+        assert format_program(parse_program(example.program)) == example.program
         said = f" {' '.join(tokens(example.text))} "
         spans = re.split(r"[;,()]+", example.program)
         nouns = [re.sub(r"^(not )?(is )", "", span.strip()) for span in spans]
         for noun in nouns:
             known = noun.removeprefix("not ").split(" ")[0] in CONDITIONS or noun in ("thing", "one", "")
             assert known or f" {noun} " in said, (noun, example)
-    assert grammar(coarse_mask[0].text)
+    assert program_grammar(coarse_mask[0].text)
 
 
 def test_every_condition_and_every_depth_is_drawn(coarse_mask):

@@ -8,7 +8,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 pytest.importorskip("gguf", reason="training needs the extra `train`")
 
-from placegraph.nodes.grounding.llm_parser import OPENING, asked  # noqa: E402
+from placegraph.nodes.grounding.llm_parser import OPENING, model_input  # noqa: E402
 from placegraph.runtime.errors import ModelError  # noqa: E402
 from placegraph.runtime.language.language_model import LanguageModel, default_model_path  # noqa: E402
 from placegraph.tools.training.lora_export import write_adapter  # noqa: E402
@@ -34,14 +34,14 @@ def last_logits(network, sentences):
     return network(sentences, ends).numpy()
 
 
-def likeness(a, b):
+def similarity(a, b):
     return float(np.corrcoef(a, b)[0, 1])
 
 
 def test_it_computes_what_llama_cpp_computes_with_the_adapter_written_and_read(network, tmp_path):
     write_adapter(network, tmp_path / "adapter.gguf", {"name": "random"})
     model = LanguageModel(adapter_path=tmp_path / "adapter.gguf", n_ctx=128)
-    sentences = [model.tokenize_prompt(asked(text), OPENING) for text in TEXTS]
+    sentences = [model.tokenize_prompt(model_input(text), OPENING) for text in TEXTS]
     computed = last_logits(network, sentences)
     for tokens, expected in zip(sentences, computed, strict=True):
         found = {}
@@ -50,9 +50,9 @@ def test_it_computes_what_llama_cpp_computes_with_the_adapter_written_and_read(n
             model._llama.eval(tokens)
             found[adapted] = model._next_log_probabilities()
         # llama.cpp rounds what enters a product to 8 bits
-        assert likeness(found[True], expected) > 0.998
+        assert similarity(found[True], expected) > 0.998
         assert int(found[True].argmax()) == int(expected.argmax())
-        assert likeness(found[False], expected) < 0.99  # so the adapter was not left out
+        assert similarity(found[False], expected) < 0.99  # so the adapter was not left out
     model.close()
 
 

@@ -7,7 +7,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 pytest.importorskip("gguf", reason="training needs the extra `train`")
 
-from placegraph.nodes.grounding.llm_parser import read_request  # noqa: E402
+from placegraph.nodes.grounding.llm_parser import parse_by_model  # noqa: E402
 from placegraph.runtime.errors import ConfigError, ModelError  # noqa: E402
 from placegraph.runtime.language.language_model import LanguageModel  # noqa: E402
 from placegraph.tools.training import reader_training  # noqa: E402
@@ -78,5 +78,5 @@ def test_a_run_learns_stops_and_goes_on(tmp_path, monkeypatch, capsys):
     assert "step 12: " in said
     assert f"step 24: {len(EXAMPLES)} of {len(EXAMPLES)} held-out requests read exactly" in said
     learned = LanguageModel(adapter_path=out, n_ctx=128)
-    assert read_request(learned, EXAMPLES[0].text).thing.noun == "lamp"
+    assert parse_by_model(learned, EXAMPLES[0].text).thing.noun == "lamp"
     learned.close()

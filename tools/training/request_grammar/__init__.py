@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from random import Random
 
 from placegraph.nodes.grounding.program import Thing
-from placegraph.nodes.grounding.program_syntax import write
+from placegraph.nodes.grounding.program_syntax import format_program
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.tools.training.request_grammar.phrase_grammar import PhraseGrammar
 from placegraph.tools.training.request_grammar.sentence_grammar import SentenceGrammar
@@ -41,7 +41,9 @@ def _example(seed: int, number: int, held_out: bool) -> Example:
         text, thing = SentenceGrammar(PhraseGrammar(random, held_out)).request()
         words = tokens(text)
         if len(words) <= MAX_WORDS and _can_be_copied(thing, f" {' '.join(words)} "):
-            return Example(text[0].upper() + text[1:] if random.random() < 0.5 else text, write(_as_tokens(thing)))
+            return Example(
+                text[0].upper() + text[1:] if random.random() < 0.5 else text, format_program(_as_tokens(thing))
+            )
         attempt += 1
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.nodes.grounding.program import CONDITIONS
-from placegraph.nodes.grounding.relations import HOLDS, Case, families, triggers
-from placegraph.nodes.grounding.viewpoint import Views
+from placegraph.nodes.grounding.relations import HOLDS, RelationQuery, relations_by_name, trigger_phrases
+from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 SOUTH = np.array([0.0, -5.0, 1.5])  # looking north: left is -x
@@ -33,21 +33,21 @@ def boxes_of(nodes, room=ROOM):
     return layout_of(SceneGraph.of([*places_of(room), *nodes]))
 
 
-def judge(relation, targets, anchors=None, view=SOUTH, room=ROOM, seconds=None):
+def evaluate(relation, targets, anchors=None, viewpoint=SOUTH, room=ROOM, second_anchors=None):
     """Fits of all targets and anchors."""
-    listed = {node.id: node for node in (*targets, *(anchors or ()), *(seconds or ()))}
+    listed = {node.id: node for node in (*targets, *(anchors or ()), *(second_anchors or ()))}
     layout = boxes_of(listed.values(), room)
 
     def take(nodes):
         return None if nodes is None else layout.all.take([layout.row[node.id] for node in nodes])
 
-    views = Views(layout, view)
-    case = Case(relation, take(targets), take(anchors), layout, views, take(seconds))
-    return families()[relation].judge(case)
+    viewpoints = ViewpointSelector(layout, viewpoint)
+    query = RelationQuery(relation, take(targets), take(anchors), layout, viewpoints, take(second_anchors))
+    return relations_by_name()[relation].evaluate(query)
 
 
 def fit(relation, target, anchor, **kwargs):
-    fits = judge(relation, [target], [anchor], **kwargs)
+    fits = evaluate(relation, [target], [anchor], **kwargs)
     assert fits.values.shape == (1, 1)
     assert 0 <= fits.values[0, 0] <= 1
     assert "O0" in fits.sentence(0, 0)
@@ -62,26 +62,28 @@ def cube(thing_of):
 
 def test_every_relation_and_rank_of_the_schema_has_a_judge():
     spatial = {name for name, form in CONDITIONS.items() if form.kind in ("relation", "rank")}
-    assert spatial == set(families())
+    assert spatial == set(relations_by_name())
 
 
 def test_every_relation_survives_nothing(cube):
-    for relation in sorted(families()):
+    for relation in sorted(relations_by_name()):
         anchors = None if CONDITIONS[relation].things[1] == 0 else []
-        seconds = [] if relation == "between" else None
-        assert judge(relation, [], anchors, seconds=seconds).values.size == 0, relation
+        second_anchors = [] if relation == "between" else None
+        assert evaluate(relation, [], anchors, second_anchors=second_anchors).values.size == 0, relation
         if CONDITIONS[relation].things[1]:
-            assert judge(relation, [cube(0, (0, 0, 0))], [], seconds=seconds).values.shape == (1, 0), relation
+            assert evaluate(relation, [cube(0, (0, 0, 0))], [], second_anchors=second_anchors).values.shape == (1, 0), (
+                relation
+            )
 
 
 def test_phrases_belong_to_one_relation():
-    phrases = [phrase for family in set(map(id, families().values())) for phrase in _phrases(family)]
+    phrases = [phrase for family in set(map(id, relations_by_name().values())) for phrase in _phrases(family)]
     assert len(phrases) == len(set(phrases))
-    assert len(triggers()) == len(phrases)
+    assert len(trigger_phrases()) == len(phrases)
 
 
 def _phrases(family_id):
-    family = next(family for family in families().values() if id(family) == family_id)
+    family = next(family for family in relations_by_name().values() if id(family) == family_id)
     return [phrase for several in family.phrases.values() for phrase in several]
 
 
@@ -126,21 +128,21 @@ def test_what_lies_deep_in_a_box_is_under_its_top_and_not_on_it(cube, thing_of):
 
 
 def test_an_anchor_at_the_viewpoint_has_no_left(cube):
-    fits = judge("left", [cube(0, (1, 0, 0))], [cube(1, (0, 0, 0))], view=np.zeros(3))
+    fits = evaluate("left", [cube(0, (1, 0, 0))], [cube(1, (0, 0, 0))], viewpoint=np.zeros(3))
     assert "has no sides" in fits.sentence(0, 0)
 
 
 def test_without_a_viewer_in_front_is_near_and_a_side_decides_less(cube):
     sofa = cube(1, (0, 3.5, 0))
     before, behind = cube(0, (0, 2.5, 0)), cube(2, (0, 4.5, 0))
-    fits = judge("front", [before, behind], [sofa], view=NOBODY)
+    fits = evaluate("front", [before, behind], [sofa], viewpoint=NOBODY)
     assert fits.values[0, 0] > fits.values[1, 0] >= 0.3  # the room's middle is before it
-    assert judge("left", [before], [sofa], view=NOBODY).trust < 1 == judge("left", [before], [sofa]).trust
+    assert evaluate("left", [before], [sofa], viewpoint=NOBODY).trust < 1 == evaluate("left", [before], [sofa]).trust
 
 
 def test_between(cube):
     targets = [cube(0, (0, 0.3, 0)), cube(3, (0, 3, 0)), cube(4, (4, 0, 0))]
-    fits = judge("between", targets, [cube(1, (-2, 0, 0))], seconds=[cube(2, (2, 0, 0))])
+    fits = evaluate("between", targets, [cube(1, (-2, 0, 0))], second_anchors=[cube(2, (2, 0, 0))])
     assert (fits.values[:, 0] >= HOLDS).tolist() == [True, False, False]
     assert "from cube O1 to cube O2" in fits.sentence(0, 0)
 
@@ -152,33 +154,35 @@ def test_between(cube):
 )  # fmt: skip
 def test_ranks(cube, relation, first):
     row = [cube(i, (i, (i == 1) * -0.5 + 0.1 * i, i / 10), (0.1 + i / 10,) * 3) for i in range(3)]
-    assert judge(relation, row).values[:, 0].argmax() == first
+    assert evaluate(relation, row).values[:, 0].argmax() == first
 
 
 def test_closest_is_by_surfaces_and_a_wall_between_makes_far(cube, thing_of):
     long, small = cube(0, (3, 0, 0), (5, 0.4, 0.4)), cube(1, (0, 1.2, 0))
-    assert judge("closest", [long, small], [cube(9, (0, 0, 0))]).values.argmax() == 0
+    assert evaluate("closest", [long, small], [cube(9, (0, 0, 0))]).values.argmax() == 0
     room = Node(
         id="R1", parent="F0", tags=(), box=np.array([[0, 0, 3], [4, 4, 6.0]]), footprint=np.zeros((0, 2)),
         first_frame=-1, last_frame=-1,
     )  # fmt: skip
     above, beside = thing_of(1, "R1", "cube", (1, 1, 3.3), (0.4,) * 3), cube(2, (3, 1, 2.5))
     layout = layout_of(SceneGraph.of([*places_of([[0, 0, 0], [4, 4, 3.0]]), room, cube(0, (1, 1, 2.5)), above, beside]))
-    case = Case("closest", layout.all.take([1, 2]), layout.all.take([0]), layout, Views(layout, NOBODY))
-    assert families()["closest"].judge(case).values.argmax() == 1
+    query = RelationQuery(
+        "closest", layout.all.take([1, 2]), layout.all.take([0]), layout, ViewpointSelector(layout, NOBODY)
+    )
+    assert relations_by_name()["closest"].evaluate(query).values.argmax() == 1
 
 
 def test_in_the_room(cube):
     room = [[0, 0, 0], [4, 4, 2.5]]
     nodes = [cube(0, (0.3, 0.3, 0.2)), cube(1, (2, 2, 0.2)), cube(2, (2, 0.3, 0.2))]
     for relation, expected in (("corner", [True, False, False]), ("center", [False, True, False])):
-        assert (judge(relation, nodes, room=room).values[:, 0] >= HOLDS).tolist() == expected
+        assert (evaluate(relation, nodes, room=room).values[:, 0] >= HOLDS).tolist() == expected
 
 
 def test_what_faces_is_known_of_things_with_a_front_only(cube):
     chair, desk = dataclasses.replace(cube(0, (0, 0, 0)), front=(1.0, 0.0)), cube(1, (1, 0, 0))
     assert fit("facing", chair, desk) >= HOLDS > fit("facing", dataclasses.replace(chair, front=(-1.0, 0.0)), desk)
-    assert not judge("facing", [cube(0, (0, 0, 0))], [desk]).known
+    assert not evaluate("facing", [cube(0, (0, 0, 0))], [desk]).known
 
 
 @pytest.mark.parametrize(
@@ -186,11 +190,11 @@ def test_what_faces_is_known_of_things_with_a_front_only(cube):
     [(0.4, "level with the top"), (0.45, "0.05 m above the top"), (0.3, "0.10 m below the top")],
 )
 def test_what_lies_on_something_is_told_from_its_top(cube, height, words):
-    fits = judge("on", [cube(1, (0, 0, height))], [cube(0, (0, 0, 0))])
+    fits = evaluate("on", [cube(1, (0, 0, height))], [cube(0, (0, 0, 0))])
     assert fits.sentence(0, 0).startswith(f"the bottom of cube O1 is {words} of cube O0")
 
 
 def test_what_stands_before_the_end_of_a_wide_thing_is_before_it_and_not_beside(cube):
     sofa, before, beside = cube(1, (0, 0, 0), (2.4, 0.8, 0.8)), cube(0, (-1.0, -0.8, 0)), cube(2, (-2.0, -0.1, 0))
-    left, front = (judge(name, [before, beside], [sofa]).values[:, 0] for name in ("left", "front"))
+    left, front = (evaluate(name, [before, beside], [sofa]).values[:, 0] for name in ("left", "front"))
     assert (left.argmax(), front.argmax()) == (1, 0)
