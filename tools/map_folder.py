@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from placegraph.runtime.arrays import F32, F64, U8
 from placegraph.runtime.config import Dataflow, RunConfig
 from placegraph.runtime.errors import ConfigError, SchemaError
-from placegraph.runtime.messages import Correction, End, Graph, Map, Message, PlaceNames, Pose
+from placegraph.runtime.messages import Correction, End, Graph, Map, Message, NamedGraph, Pose
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.runtime.vision.geometry import quaternion_xyzw
 from placegraph.tools.corrected import CorrectedKeyframes
@@ -64,15 +64,15 @@ class Collector:
     """Keeps what the map folder needs out of the messages of a run."""
 
     def __init__(self, dataflow: Dataflow) -> None:
-        self._expects_graph = dataflow.producer(Graph) is not None
-        self._expects_names = dataflow.producer(PlaceNames) is not None
+        self.graph_kind = NamedGraph if dataflow.producer(NamedGraph) is not None else Graph
+        self._expects_graph = dataflow.producer(self.graph_kind) is not None
         self.ended = False
         self._frames_of_source = 0
         self.clock = Clock()
         self._odometry: list[Pose] = []
         self._corrections = CorrectedKeyframes()
         self.map: Map | None = None
-        self.graph: Graph | None = None
+        self.graph: Graph | NamedGraph | None = None
 
     def add(self, message: Message) -> None:
         """Take any message; keeps poses and corrections, the newest map and the newest graph."""
@@ -82,7 +82,7 @@ class Collector:
             self._corrections.add(message)
         elif isinstance(message, Map):
             self.map = message
-        elif isinstance(message, Graph):
+        elif isinstance(message, self.graph_kind):
             self.graph = message
         elif isinstance(message, End):
             self.ended, self._frames_of_source = True, message.frames
@@ -99,10 +99,10 @@ class Collector:
 
     @property
     def complete(self) -> bool:
-        """The last graph of the run is here, with its names if any are to come; without a graph, the source's end."""
+        """Whether the last graph of the run is here, or where no node gives a graph, whether the source has ended."""
         if not self._expects_graph:
             return self.ended
-        return self.graph is not None and self.graph.final and (self.graph.named or not self._expects_names)
+        return self.graph is not None and self.graph.final
 
     def write(self, folder: Path) -> None:
         """Write what there is; geometry and graph are left out when no map came."""

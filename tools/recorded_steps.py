@@ -183,7 +183,7 @@ def summary(reference: Reference) -> str:
     for message in reference.messages:
         if isinstance(message, m.Answer):
             lines += [f"== answer {message.question_id}", _indented(message.json)]
-    graphs = [message for message in reference.messages if isinstance(message, m.Graph)][-1:]
+    graphs = [message for message in reference.messages if isinstance(message, m.NamedGraph)][-1:]
     for message in graphs:
         lines += ["== the last graph", _indented(message.json)]
     return "\n".join([*lines, ""])

@@ -32,6 +32,7 @@ DRAWN: dict[type[m.Message], Callable[[Picture, Any, dict[str, bytes]], None]] =
     m.Segments: images.draw_segments,
     m.Map: space.draw_map,
     m.Graph: places.draw_graph,
+    m.NamedGraph: places.draw_graph,
     m.Question: places.draw_question,
     m.Answer: places.draw_answer,
     m.Health: numbers.draw_health,
@@ -62,6 +63,8 @@ class Recorder(Node):
         if not config.file and not config.viewer_port:
             raise ConfigError("[nodes.recorder] file is empty and viewer_port is 0: nothing would be recorded or shown")
         self.inputs = (m.Frame, *RECORDED) if config.frames else RECORDED
+        if m.NamedGraph.__name__ in context.given:  # it holds all of the Graph, and names
+            self.inputs = tuple(kind for kind in self.inputs if kind is not m.Graph)
         self._writer: RecordingWriter | None = None
         self._picture: Picture | None = None
 

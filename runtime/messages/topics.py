@@ -43,7 +43,7 @@ TOPICS: dict[type[m.Message], Topic] = {
         Topic(m.Segments, "segments", window=6, newest=0, rate_hz=1.0, recorded=True),
         Topic(m.Map, "map", window=2, newest=1, rate_hz=0.0, recorded=True),
         Topic(m.Graph, "graph", window=2, newest=1, rate_hz=0.0, recorded=True),
-        Topic(m.PlaceNames, "place_names", window=8, newest=0, rate_hz=0.0, recorded=True),
+        Topic(m.NamedGraph, "named_graph", window=2, newest=1, rate_hz=0.0, recorded=True),
         Topic(m.Question, "question", window=0, newest=0, rate_hz=0.0, recorded=True),
         Topic(m.Answer, "answer", window=0, newest=0, rate_hz=0.0, recorded=True),
         Topic(m.Health, "health", window=0, newest=0, rate_hz=1.0, recorded=True),

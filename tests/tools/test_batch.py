@@ -13,7 +13,7 @@ from placegraph.runtime.errors import ConfigError, QueryError
 from placegraph.tools.answerer import Answerer
 from placegraph.tools.batch import Batch, answer_all
 
-FAST = {"use_model": False, "name_places": False}
+FAST = {"use_model": False}
 ROOM = {
     "objects": [
         {"id": 3, "tags": ["chair"], "center": [0, 0, 0.5], "size": [0.5, 0.5, 1], "color": "red"},

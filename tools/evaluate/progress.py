@@ -12,7 +12,7 @@ import numpy as np
 
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.errors import SchemaError, SourceError
-from placegraph.runtime.messages import Graph, Map, Segments
+from placegraph.runtime.messages import Graph, Map, NamedGraph, Segments
 from placegraph.runtime.recording import read
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.aligned_map import NOTHING, AlignedMap, aligned
@@ -29,7 +29,7 @@ PARTS = (0.25, 0.5, 0.75, 1.0)  # of the frames
 class Part:
     """The newest graph of a recording by a time, the map it was built from, and when each keyframe of it was."""
 
-    graph: Graph
+    graph: Graph | NamedGraph
     map: Map
     stamps_ns: tuple[int, ...]
 
@@ -81,29 +81,28 @@ def recorded_parts(recording: Path, until_ns: list[int]) -> list[Part | None]:
 
     Raises SourceError without the file, SchemaError when it is damaged or lacks the Map of a Graph.
     """
-    graphs: list[Graph] = []
+    graphs: list[Graph | NamedGraph] = []
     stamps: dict[int, int] = {}
-    for message in read(recording, (Graph, Segments)):  # Segments: one a keyframe, and small
-        if isinstance(message, Graph):
+    for message in read(recording, (Graph, NamedGraph, Segments)):  # Segments: one a keyframe, and small
+        if isinstance(message, Graph | NamedGraph):
             graphs.append(message)
         else:
             stamps[message.frame_id] = message.stamp_ns
-    newest = [max((g for g in graphs if g.stamp_ns <= end), key=_age, default=None) for end in until_ns]
+    newest = [
+        max((g for g in graphs if g.stamp_ns <= end), key=lambda graph: graph.revision, default=None)
+        for end in until_ns
+    ]
     asked = {graph.revision for graph in newest if graph is not None}
     maps = {one.revision: one for one in read(recording, (Map,)) if isinstance(one, Map) and one.revision in asked}
     absent = sorted(asked - maps.keys())
     if absent:
         raise SchemaError(f"{recording}: holds Graph {absent[0]} without the Map that it was built from")
 
-    def part(graph: Graph) -> Part:
+    def part(graph: Graph | NamedGraph) -> Part:
         upto = tuple(stamp for frame, stamp in sorted(stamps.items()) if frame <= maps[graph.revision].frame_id)
         return Part(graph, maps[graph.revision], upto)
 
     return [None if graph is None else part(graph) for graph in newest]
-
-
-def _age(graph: Graph) -> tuple[int, bool]:
-    return graph.revision, graph.named
 
 
 def _seen_after(source: Path, truth: Truth, stamps: list[int], counts: list[int]) -> list[tuple[Seen, ...]]:
