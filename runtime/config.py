@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Health, Message, Question
-from placegraph.runtime.node import Context, Node, Source, build_node
+from placegraph.runtime.node import NODES, Context, Node, Source, available, build_node, plugin
 
 # Published by the shells, not by a node: requests from outside, and each process's report on itself.
 PRODUCED_BY_SHELL: tuple[type[Message], ...] = (Health, Question)
@@ -157,4 +157,12 @@ def _check_wiring(dataflow: Dataflow) -> None:
         for kind in node.inputs:
             needed = kind not in PRODUCED_BY_SHELL and kind not in node.feedback and kind not in node.optional
             if needed and dataflow.producer(kind) is None:
-                raise ConfigError(f"{name} needs {kind.__name__}, which no node produces")
+                raise ConfigError(
+                    f"{name} needs {kind.__name__}, which no node produces: add {_possible_producers(kind)}"
+                )
+
+
+def _possible_producers(kind: type[Message]) -> str:
+    """The sections of a dataflow file that would produce a kind."""
+    names = [name for name in available(NODES) if kind in plugin(NODES, name, "NODE", "node").outputs]
+    return " or ".join(f"[nodes.{name}]" for name in names)

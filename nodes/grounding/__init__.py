@@ -1,6 +1,6 @@
-"""Grounding: scene graph and question to answer; also names rooms and locations.
+"""Grounding: the named scene graph and a question to the answer.
 
-Source: paper, "Deductive Hierarchical Reasoning Algorithm", "Room Layer" and "Location Layer" (their text tags).
+Source: paper, "Deductive Hierarchical Reasoning Algorithm".
 """
 
 from __future__ import annotations
@@ -8,19 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from pydantic import Field
-
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.grounding.answer_fields import error_answer, to_json
 from placegraph.nodes.grounding.llm_parser import default_adapter_path
 from placegraph.nodes.grounding.name_matching import NameMatcher
-from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, PlaceNamer
 from placegraph.nodes.grounding.reasoner import Reasoner
-from placegraph.runtime.errors import ConfigError, ModelError, QueryError
-from placegraph.runtime.language.grammar_options import SAFE_OPTION
+from placegraph.runtime.errors import ModelError, QueryError
 from placegraph.runtime.language.language_model import N_CTX, LanguageModel
-from placegraph.runtime.messages import Answer, Graph, Message, PlaceNames, Question
+from placegraph.runtime.messages import Answer, Message, NamedGraph, Question
 from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.scene_graph import SceneGraph
 
@@ -32,42 +27,32 @@ class GroundingConfig(NodeConfig):
     adapter_path: str = ""  # of a model of one's own, trained by `placegraph train reader`; empty: it reads by examples
     n_ctx: int = N_CTX  # tokens
     seed: int = 0
-    name_places: bool = True  # False: rooms and locations stay without names
     use_model: bool = True  # False: no question is put to the language model; what it would decide stays open
-    room_types: list[str] = Field(list(ROOM_TYPES))  # lists: what an array in TOML is
-    location_types: list[str] = Field(list(LOCATION_TYPES))
 
 
 class Grounding(Node):
-    """Keeps the newest graph, names its places, and answers each question with exactly one Answer."""
+    """Keeps the newest graph and answers each question with exactly one Answer."""
 
     config_type = GroundingConfig
-    inputs = (Graph, Question)
-    outputs = (PlaceNames, Answer)
+    inputs = (NamedGraph, Question)
+    outputs = (Answer,)
     serves = (Question, Answer)
 
     def __init__(self, config: GroundingConfig, context: Context) -> None:
         super().__init__(config, context)
-        for setting, types in (("room_types", config.room_types), ("location_types", config.location_types)):
-            unsafe = [name for name in types if not SAFE_OPTION.fullmatch(name)]
-            if unsafe or not types:
-                raise ConfigError(f"[nodes.grounding] {setting}: names of letters and digits expected, found {unsafe}")
         path = Path(config.model_path) if config.model_path else None
         adapter = Path(config.adapter_path) if config.adapter_path else None if path else default_adapter_path()
         self._model = LanguageModel(
             path, adapter_path=adapter, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed
         )
-        encoder = TextEncoder()
-        self._namer = PlaceNamer(self._model, encoder, config.room_types, config.location_types)
-        place_types = (*config.room_types, *config.location_types)
-        names = NameMatcher(encoder.encode)
-        self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model)
+        self._names = NameMatcher(TextEncoder().encode)
         self._graph: SceneGraph | None = None
         self._revision = -1
+        self._reasoner: Reasoner | None = None  # of the newest graph
 
     def start(self) -> None:
         """Load the language model, if it will be used. Raises ModelError."""
-        if self.config.name_places or self.config.use_model:
+        if self.config.use_model:
             self._model.load()
 
     def stop(self) -> None:
@@ -75,32 +60,18 @@ class Grounding(Node):
         self._model.close()
 
     def step(self, message: Message) -> Sequence[Message]:
-        """A Graph without names gives PlaceNames; a Question gives an Answer. Raises SchemaError for a broken graph."""
-        if isinstance(message, Graph):
-            return self._take_graph(message)
+        """A graph is kept, a Question gives an Answer. Raises SchemaError for a broken graph."""
+        if isinstance(message, NamedGraph):
+            self._graph = SceneGraph.from_json(message.json, f"NamedGraph of revision {message.revision}")
+            self._revision = message.revision
+            self._reasoner = Reasoner(self._names, self._model, message.place_types, use_model=self.config.use_model)
+            return []
         assert isinstance(message, Question)
         return [self._answer(message)]
 
-    def _take_graph(self, message: Graph) -> list[PlaceNames]:
-        self._graph = SceneGraph.from_json(message.json, f"Graph of revision {message.revision}")
-        self._revision = message.revision
-        if message.named:
-            return []
-        place_names = self._namer.name_places(self._graph) if self.config.name_places else []
-        names = PlaceNames(
-            frame_id=message.frame_id,
-            stamp_ns=message.stamp_ns,
-            revision=message.revision,
-            final=message.final,
-            ids=tuple(name.node_id for name in place_names),
-            names=tuple(name.name for name in place_names),
-            weights=np.array([name.probability for name in place_names], np.float32),
-        )
-        return [names]
-
     def _answer(self, question: Question) -> Answer:
         try:
-            if self._graph is None:
+            if self._graph is None or self._reasoner is None:
                 raise QueryError("no scene graph has arrived yet")
             fields = self._reasoner.answer(self._graph, self._revision, question)
         except (QueryError, ModelError) as error:  # a question always gets a reply

@@ -30,6 +30,7 @@ DRAWN: dict[type[m.Message], Callable[[Canvas, Any, dict[str, bytes]], None]] = 
     m.Segments: draw_images.draw_segments,
     m.Map: draw_map.draw_map,
     m.Graph: draw_scene_graph.draw_graph,
+    m.NamedGraph: draw_scene_graph.draw_graph,
     m.Question: draw_scene_graph.draw_question,
     m.Answer: draw_scene_graph.draw_answer,
     m.Health: draw_health,
@@ -60,6 +61,8 @@ class Recorder(Node):
         if not config.file and not config.viewer_port:
             raise ConfigError("[nodes.recorder] file is empty and viewer_port is 0: nothing would be recorded or shown")
         self.inputs = (m.Frame, *RECORDED) if config.frames else RECORDED
+        if m.NamedGraph.__name__ in context.produced_kinds:  # it holds all of the Graph, and names
+            self.inputs = tuple(kind for kind in self.inputs if kind is not m.Graph)
         self._writer: RecordingWriter | None = None
         self._picture: Canvas | None = None
 

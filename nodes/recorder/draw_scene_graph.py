@@ -30,9 +30,9 @@ CONNECTION_RAISE_M = 0.06
 ANSWER_COLOR: Color = (255, 230, 0)
 
 
-def draw_graph(canvas: Canvas, graph: m.Graph, pngs: dict[str, bytes]) -> None:
+def draw_graph(canvas: Canvas, graph: m.Graph | m.NamedGraph, pngs: dict[str, bytes]) -> None:
     """Outlines in the world and the whole tree; both replace those of the last graph."""
-    scene = SceneGraph.from_json(graph.json, f"Graph revision {graph.revision}")
+    scene = SceneGraph.from_json(graph.json, f"{type(graph).__name__} of revision {graph.revision}")
     outlines = {
         f"world/{OUTLINE_GROUPS[node.layer]}/{node.id}": _outline(node)
         for node in scene.nodes.values()

@@ -73,19 +73,28 @@ class LanguageModel:
         self._adapter_is_on = False
         self._prefix_states: dict[tuple[str, bool], Any] = {}  # KV cache behind a prefix, by (prefix, use_adapter)
 
-    def load(self) -> None:
-        """Load the weights unless that is done; raises ModelError when there are none or llama.cpp refuses them."""
-        if self._llama is not None:
-            return
+    def check_files(self) -> Path:
+        """The path of the model's file; raises ModelError when it or the adapter's is absent. Loads nothing."""
         path = self.model_path or default_model_path()
         if not path.is_file():
             raise ModelError(f"{path}: no such language model (setting model_path; a GGUF file)")
         if self.adapter_path is not None and not self.adapter_path.is_file():
             raise ModelError(f"{self.adapter_path}: no such adapter of a language model (a GGUF file)")
+        return path
+
+    def load(self) -> None:
+        """Load the weights unless that is done; raises ModelError when there are none or llama.cpp refuses them.
+
+        The file is mapped, not read: processes that load the same file share its pages.
+        """
+        if self._llama is not None:
+            return
+        path = self.check_files()
         llama_cpp = import_llama_cpp()
         try:
             self._llama = llama_cpp.Llama(
                 str(path),
+                use_mmap=True,
                 n_ctx=self.n_ctx,
                 n_batch=min(512, self.n_ctx),
                 n_threads=self.threads,

@@ -156,23 +156,21 @@ class Map(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Graph(Message):
-    """The scene graph, complete each time, as its canonical JSON (runtime/scene_graph/graph.py)."""
+    """The scene graph without names of places, complete each time, as canonical JSON (scene_graph/graph.py)."""
 
     revision: int  # that of the Map it was built from
     final: bool
-    named: bool  # rooms and locations carry the names found for this very revision
     json: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PlaceNames(Message):
-    """Names for rooms and locations of one graph revision."""
+class NamedGraph(Message):
+    """The same scene graph with names on rooms and locations, their probabilities as the weights of their tags."""
 
-    revision: int
+    revision: int  # that of the Graph
     final: bool
-    ids: tuple[str, ...]  # node id of each entry; a node may have several names, best first
-    names: tuple[str, ...]
-    weights: F32 = array("float32", ("N",), unit="1")
+    place_types: tuple[str, ...]  # all names that stand for a type of place, also where the graph has none such
+    json: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

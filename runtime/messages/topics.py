@@ -46,7 +46,7 @@ TOPICS: dict[type[m.Message], Topic] = {
         Topic(m.Segments, "segments", credit=6, keep_newest=0, rate_hz=1.0, recorded=True),
         Topic(m.Map, "map", credit=2, keep_newest=1, rate_hz=0.0, recorded=True),
         Topic(m.Graph, "graph", credit=2, keep_newest=1, rate_hz=0.0, recorded=True),
-        Topic(m.PlaceNames, "place_names", credit=8, keep_newest=0, rate_hz=0.0, recorded=True),
+        Topic(m.NamedGraph, "named_graph", credit=2, keep_newest=1, rate_hz=0.0, recorded=True),
         Topic(m.Question, "question", credit=0, keep_newest=0, rate_hz=0.0, recorded=True),
         Topic(m.Answer, "answer", credit=0, keep_newest=0, rate_hz=0.0, recorded=True),
         Topic(m.Health, "health", credit=0, keep_newest=0, rate_hz=1.0, recorded=True),

@@ -30,7 +30,7 @@ with zenoh.open(config) as session:
 def mapped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
     folder, endpoint = tmp_path_factory.mktemp("run"), free_endpoint()
     config = folder / "small.toml"
-    nodes = "\n".join(f"[nodes.{name}]" for name in ("fusion", "hierarchy", "grounding"))
+    nodes = "\n".join(f"[nodes.{name}]" for name in ("fusion", "hierarchy", "naming", "grounding"))
     config.write_text(
         '[nodes.camera]\nsource = "flat"\nsettings = { width = 160, height = 120, frames = 120 }\nlimit = 45\n'
         '[nodes.pose]\nmethod = "given"\n[nodes.keyframe]\n[nodes.instances]\nmodel = "drawn_scene"\n' + nodes

@@ -14,10 +14,10 @@ import numpy as np
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.grounding.llm_parser import default_adapter_path, parse_by_examples, parse_by_model
 from placegraph.nodes.grounding.name_matching import NameMatcher
-from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
 from placegraph.nodes.grounding.program import Thing, normalized
 from placegraph.nodes.grounding.program_syntax import format_program, parse_program
 from placegraph.nodes.grounding.reasoner import Reasoner
+from placegraph.nodes.naming.place_types import LOCATION_TYPES, ROOM_TYPES
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.scene_graph import Node, SceneGraph

@@ -146,7 +146,7 @@ def place(node_id: str, parent: str, name: str = "", corners: int = 4) -> Node:
 
 def graph(*nodes: Node, frame_id: int = 0) -> m.Graph:
     text = SceneGraph.of([place("B0", ""), *nodes]).to_json()
-    return m.Graph(frame_id=frame_id, stamp_ns=0, revision=1, final=False, named=False, json=text)
+    return m.Graph(frame_id=frame_id, stamp_ns=0, revision=1, final=False, json=text)
 
 
 def question(text: str) -> m.Question:
@@ -180,6 +180,17 @@ def test_takes_what_the_table_marks_and_frames_only_when_told() -> None:
     assert NODE(RecorderConfig(frames=True), Context()).inputs == (m.Frame, *NODE.inputs)
     assert NODE.outputs == ()
     assert set(DRAWN) <= {m.Frame, *NODE.inputs}
+
+
+def test_where_a_node_names_the_graph_it_is_recorded_with_its_names_alone() -> None:
+    inputs = NODE(RecorderConfig(), Context(produced_kinds=("Graph", "NamedGraph"))).inputs
+    assert set(NODE.inputs) - set(inputs) == {m.Graph}
+
+
+def test_a_named_graph_is_drawn_as_a_graph(play: Play) -> None:
+    shared = {"frame_id": 0, "stamp_ns": 0, "revision": 1, "final": False, "json": graph(place("F0", "B0")).json}
+    (row,) = play([m.NamedGraph(**shared, place_types=())])["/graph"]
+    assert row["GraphNodes:labels"] == play([m.Graph(**shared)])["/graph"][0]["GraphNodes:labels"]
 
 
 @pytest.mark.parametrize("file", ["sub/run.rrd", "../run.rrd", "run.mcap", "/run.rrd"])
@@ -366,8 +377,8 @@ def test_the_graph_is_a_tree_without_nodes_on_top_of_each_other(play: Play) -> N
 
 
 def test_a_graph_that_is_none_is_refused(play: Play) -> None:
-    with pytest.raises(SchemaError, match="Graph revision 7: not JSON"):
-        play([m.Graph(frame_id=0, stamp_ns=0, revision=7, final=False, named=False, json="{")])
+    with pytest.raises(SchemaError, match="Graph of revision 7: not JSON"):
+        play([m.Graph(frame_id=0, stamp_ns=0, revision=7, final=False, json="{")])
 
 
 def test_an_answer_is_words_and_a_box(play: Play) -> None:

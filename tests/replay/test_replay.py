@@ -23,6 +23,7 @@ CHANGED: dict[str, dict[str, Any]] = {
     "pose_graph": {"loop_sigma_m": 0.1, "loop_sigma_rad": 0.1},
     "fusion": {"edge_ratio": 0.06},
     "hierarchy": {"floors": {"bin_m": 0.02}},
+    "naming": {"method": "none"},
     "grounding": {"use_model": False},
 }
 

@@ -53,7 +53,12 @@ def test_absent_file_lists_those_that_come_with_placegraph(tmp_path: Path) -> No
         (CAMERA + "[nodes.pose]\ngian = 1", r"\[nodes.pose\] gian: Extra inputs are not permitted"),
         (CAMERA + '[nodes.pose]\nstride = "4"', r"\[nodes.pose\] stride: Input should be a valid integer"),
         (CAMERA + "[nodes.pose]\nvoxel_m = 0.0", r"\[nodes.pose\] voxel_m: Input should be greater than 0"),
-        (CAMERA + "[nodes.keyframe]", "keyframe needs Pose, which no node produces"),
+        (
+            CAMERA + "[nodes.keyframe]",
+            r"keyframe needs Pose, which no node produces: add \[nodes.playback\] or \[nodes.pose\]",
+        ),
+        (CAMERA + "[nodes.grounding]", r"grounding needs NamedGraph, which no node produces: add \[nodes.naming\]"),
+        (CAMERA + "[nodes.grounding]\nroom_types = []", r"now called room_types of \[nodes.naming\]"),
         (
             CAMERA + '[nodes.pose]\n[nodes.keyframe]\n[nodes.tagger]\nmodel="a"\n[nodes.instances]\nmodel="b"\n'
             '[nodes.detector]\nmodel="c"',

@@ -39,8 +39,10 @@ model = "drawn_scene"
 
 [nodes.hierarchy]
 
+[nodes.naming]
+method = "none"
+
 [nodes.grounding]
-name_places = false
 use_model = false
 
 [nodes.recorder]

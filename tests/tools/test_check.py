@@ -23,7 +23,7 @@ def test_effective_settings_with_their_defaults(cli, drawn_flow) -> None:
     done = cli("check", drawn_flow)
     assert done.code == 0 and done.err == ""
     lines = done.out.splitlines()
-    assert lines[0] == f"{drawn_flow}: 8 nodes, replay"
+    assert lines[0] == f"{drawn_flow}: 9 nodes, replay"
     assert lines[1:3] == ["[nodes.camera]", '  source = "flat"']
     assert '  method = "given"' in lines and "  realtime = false" in lines
 
@@ -31,7 +31,7 @@ def test_effective_settings_with_their_defaults(cli, drawn_flow) -> None:
 def test_effective_settings_as_json(cli, drawn_flow) -> None:
     found = json.loads(cli("check", drawn_flow, "--json").out)
     assert set(found) == {"run", "bus", "nodes"}
-    assert next(iter(found["nodes"])) == "camera" and len(found["nodes"]) == 8
+    assert next(iter(found["nodes"])) == "camera" and len(found["nodes"]) == 9
     assert found["nodes"]["pose"]["method"] == "given" and found["nodes"]["camera"]["limit"] == 20
     assert found["run"]["threads"] == 1 and found["bus"]["prefix"] == "placegraph"
 

@@ -13,7 +13,7 @@ from placegraph.runtime.node import Context, build_node
 from placegraph.runtime.process import NodeProcess, ProcessSpec
 from placegraph.runtime.recording import RecordingWriter, read
 
-QUIET_NODE = {"name_places": False, "use_model": False}
+QUIET_NODE = {"use_model": False}
 
 
 def test_the_same_recording_gives_the_same_bytes(cli, mapped, tmp_path) -> None:
@@ -103,8 +103,8 @@ def crash(tmp_path):
         bus=BusConfig(endpoint="tcp/127.0.0.1:1", prefix="test"), consumers={},
     )  # fmt: skip
     process = NodeProcess(spec, build_node("grounding", QUIET_NODE, spec.context))
-    graph = m.Graph(frame_id=7, stamp_ns=0, revision=2, final=False, named=False, json="{")
-    process.inbox.put(Envelope(m.Graph, 1, encode(graph)))
+    graph = m.NamedGraph(frame_id=7, stamp_ns=0, revision=2, final=False, place_types=(), json="{")
+    process.inbox.put(Envelope(m.NamedGraph, 1, encode(graph)))
     process.stop()
     with pytest.raises(SchemaError):
         process.run()
@@ -114,18 +114,18 @@ def crash(tmp_path):
 def test_a_crash_happens_again(cli, crash) -> None:
     done = cli("replay", crash)
     assert done.code == 1
-    assert done.out.startswith("grounding ended with:\nTraceback") and done.out.endswith("step Graph of frame 7\n")
-    assert done.reason.startswith("Graph of revision 2: not JSON")
+    assert done.out.startswith("grounding ended with:\nTraceback") and done.out.endswith("step NamedGraph of frame 7\n")
+    assert done.reason.startswith("NamedGraph of revision 2: not JSON")
 
 
 def test_a_step_that_goes_well_here_says_what_it_gives(cli, crash, mapped) -> None:
     spec, trace, _ = msgpack.unpackb(crash.read_bytes())
     text = (mapped / "graph.json").read_text()
-    good = m.Graph(frame_id=7, stamp_ns=0, revision=2, final=False, named=False, json=text)
-    crash.write_bytes(msgpack.packb([spec, trace, [["Graph", encode(good)]]]))
+    good = m.NamedGraph(frame_id=7, stamp_ns=0, revision=2, final=False, place_types=(), json=text)
+    crash.write_bytes(msgpack.packb([spec, trace, [["NamedGraph", encode(good)]]]))
     done = cli("replay", crash)
     assert (done.code, done.err) == (0, "")
-    assert done.out.endswith("step Graph of frame 7\n  gives PlaceNames of frame 7\n")
+    assert done.out.endswith("step NamedGraph of frame 7\n")
 
 
 def test_a_recorders_crash_does_not_write_over_the_recording(cli, crash, tmp_path) -> None:
@@ -150,10 +150,10 @@ def test_a_file_that_is_no_crash_file(cli, tmp_path, content) -> None:
 
 
 def test_a_crash_file_of_another_version(cli, crash, monkeypatch) -> None:
-    monkeypatch.setattr(m.Graph, "checksum", classmethod(lambda cls: "0badc0de"))
+    monkeypatch.setattr(m.NamedGraph, "checksum", classmethod(lambda cls: "0badc0de"))
     done = cli("replay", crash)
     assert done.code == 1
-    assert done.reason.startswith(f"{crash}: Graph: the payload was declared as ") and "0badc0de" in done.reason
+    assert done.reason.startswith(f"{crash}: NamedGraph: the payload was declared as ") and "0badc0de" in done.reason
 
 
 def test_no_crash_file(cli, tmp_path) -> None:

@@ -99,7 +99,9 @@ def _running(graph: SceneGraph, settings: dict[str, Any]) -> Iterator[Node]:
     node = build_node("grounding", settings, Context())
     try:
         node.start()
-        node.step(Graph(frame_id=-1, stamp_ns=0, revision=1, final=True, named=True, json=graph.to_json()))
+        unnamed = Graph(frame_id=-1, stamp_ns=0, revision=1, final=True, json=graph.to_json())
+        for named_graph in build_node("naming", {"method": "none"}, Context()).step(unnamed):
+            node.step(named_graph)
         yield node
     finally:
         node.stop()

@@ -17,10 +17,10 @@ from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.camera import detect_source
 from placegraph.nodes.grounding.llm_parser import default_adapter_path, parse_by_examples, parse_by_model
 from placegraph.nodes.grounding.name_matching import NameMatcher
-from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
 from placegraph.nodes.grounding.program import Program, Thing
 from placegraph.nodes.grounding.program_syntax import parse_program
 from placegraph.nodes.grounding.reasoner import Reasoner
+from placegraph.nodes.naming.place_types import LOCATION_TYPES, ROOM_TYPES
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, QueryError, SourceError
 from placegraph.runtime.language.language_model import LanguageModel

@@ -12,7 +12,7 @@ import numpy as np
 
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.errors import SchemaError, SourceError
-from placegraph.runtime.messages import Graph, Map, Segments
+from placegraph.runtime.messages import Graph, Map, NamedGraph, Segments
 from placegraph.runtime.recording import read
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.evaluate.aligned_map import EMPTY_MAP, AlignedMap, align_map
@@ -30,7 +30,7 @@ QUARTERS = (0.25, 0.5, 0.75, 1.0)  # of the frames
 class MapSnapshot:
     """The newest graph of a recording at a time, the map it was built from, and the stamps of the map's keyframes."""
 
-    graph: Graph
+    graph: Graph | NamedGraph
     map: Map
     stamps_ns: tuple[int, ...]
 
@@ -84,30 +84,31 @@ def recorded_snapshots(recording: Path, until_ns: list[int]) -> list[MapSnapshot
 
     Raises SourceError without the file, SchemaError when it is damaged or lacks the Map of a Graph.
     """
-    graphs: list[Graph] = []
+    graphs: list[Graph | NamedGraph] = []
     stamps: dict[int, int] = {}
-    for message in read(recording, (Graph, Segments)):  # one Segments a keyframe, smaller than the Keyframe itself
-        if isinstance(message, Graph):
+    for message in read(
+        recording, (Graph, NamedGraph, Segments)
+    ):  # one Segments a keyframe, smaller than the Keyframe itself
+        if isinstance(message, Graph | NamedGraph):
             graphs.append(message)
         else:
             stamps[message.frame_id] = message.stamp_ns
-    newest = [max((g for g in graphs if g.stamp_ns <= end), key=_age, default=None) for end in until_ns]
+    newest = [
+        max((g for g in graphs if g.stamp_ns <= end), key=lambda graph: graph.revision, default=None)
+        for end in until_ns
+    ]
     revisions = {graph.revision for graph in newest if graph is not None}
     maps = {m.revision: m for m in read(recording, (Map,)) if isinstance(m, Map) and m.revision in revisions}
     missing = sorted(revisions - maps.keys())
     if missing:
         raise SchemaError(f"{recording}: holds Graph {missing[0]} without the Map that it was built from")
 
-    def snapshot(graph: Graph) -> MapSnapshot:
+    def snapshot(graph: Graph | NamedGraph) -> MapSnapshot:
         map_ = maps[graph.revision]
         keyframe_stamps = tuple(stamp for frame, stamp in sorted(stamps.items()) if frame <= map_.frame_id)
         return MapSnapshot(graph, map_, keyframe_stamps)
 
     return [None if graph is None else snapshot(graph) for graph in newest]
-
-
-def _age(graph: Graph) -> tuple[int, bool]:
-    return graph.revision, graph.named
 
 
 def _seen_after(

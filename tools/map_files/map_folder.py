@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.config import RunConfig
 from placegraph.runtime.errors import ConfigError, SchemaError
-from placegraph.runtime.messages import Graph, Map
+from placegraph.runtime.messages import Graph, Map, NamedGraph
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.map_files.ply import points_of, read_vertices, write_points
 
@@ -34,7 +34,7 @@ PACKAGES = (
 )
 
 
-def write_map(folder: Path, map_: Map | None, graph: Graph | None) -> None:
+def write_map(folder: Path, map_: Map | None, graph: Graph | NamedGraph | None) -> None:
     """Write the clouds, the retired objects and the graph into a folder; what is None is left out."""
     if map_ is not None:
         colors = dict(zip(RGB, map_.point_colors.T, strict=True))

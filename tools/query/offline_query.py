@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any
 
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.messages import Answer, Graph, Question
+from placegraph.runtime.messages import Answer, Graph, NamedGraph, Question
 from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.query.reply import answered
 from placegraph.runtime.scene_graph.object_list import SourceId
@@ -25,7 +25,7 @@ NODE_ID = re.compile(r"\b[FRO](?:0|[1-9][0-9]*)\b")
 
 @dataclass(frozen=True)
 class _OpenFile:
-    graph: Graph
+    graph: NamedGraph
     ids: dict[str, SourceId]
     settings: dict[str, Any]
     context: Context
@@ -69,13 +69,17 @@ class OfflineQuery:
     def _read(self, path: Path) -> _OpenFile:
         scene = import_graph(find_graph(path))
         settings: dict[str, Any] = {}
+        naming: dict[str, Any] = {}
         context = Context()
         if path.is_dir() and (path / RUN).exists():  # answer with the settings of the map's own run
             config = read_config(path)
-            settings = config.nodes.get("grounding", {})
+            settings, naming = config.nodes.get("grounding", {}), config.nodes.get("naming", {})
             context = Context(model_dirs=tuple(config.run.model_dirs), threads=config.run.threads)
-        graph = Graph(frame_id=-1, stamp_ns=0, revision=0, final=True, named=True, json=scene.graph.to_json())
-        return _OpenFile(graph, scene.ids, settings | self._settings, context)
+        graph = Graph(frame_id=-1, stamp_ns=0, revision=0, final=True, json=scene.graph.to_json())
+        # places keep the names that the file gives them
+        (named_graph,) = build_node("naming", naming | {"method": "none"}, context).step(graph)
+        assert isinstance(named_graph, NamedGraph)
+        return _OpenFile(named_graph, scene.ids, settings | self._settings, context)
 
     def _node_with(self, file: _OpenFile) -> Node:
         """The node with the file's settings and graph."""

@@ -40,7 +40,7 @@ HOUSE: dict[str, dict[str, Any]] = {
     "pose": {"method": "given"},
     "fusion": {"voxel_m": 0.1, "min_observations": 2},
 }
-IN_WALK, IN_HOUSE = ("pose", "keyframe", "pose_graph"), ("instances", "fusion", "hierarchy", "grounding")
+IN_WALK, IN_HOUSE = ("pose", "keyframe", "pose_graph"), ("instances", "fusion", "hierarchy", "naming", "grounding")
 THREE: dict[str, dict[str, Any]] = {name: {"model": "drawn_scene"} for name in ("tagger", "detector", "segmenter")}
 QUESTIONS = (
     "which chair is closest to the refrigerator", "the book on the table", "the lamp in the corner", "find the piano",
@@ -100,7 +100,7 @@ def _run_and_ask(shell: Inline) -> None:
 def make() -> ReferenceRecording:
     """Run the drawn scene through every node, with the language model; the same code gives the same reference."""
     replies: dict[str, Any] = {}
-    walk, house = _part_of_flat(WALK, "fusion", "hierarchy", "grounding"), _part_of_flat(HOUSE)
+    walk, house = _part_of_flat(WALK, "fusion", "hierarchy", "naming", "grounding"), _part_of_flat(HOUSE)
     built = {name: build_node(name, settings, Context()) for name, settings in THREE.items()}
     three = Dataflow(RunConfig(nodes=THREE), Context(), built)
     with language_model_replies(replies, ask=True):

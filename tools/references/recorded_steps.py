@@ -182,7 +182,7 @@ def summary(reference: ReferenceRecording) -> str:
     for message in reference.messages:
         if isinstance(message, m.Answer):
             lines += [f"== answer {message.question_id}", _indented(message.json)]
-    for message in [message for message in reference.messages if isinstance(message, m.Graph)][-1:]:
+    for message in [message for message in reference.messages if isinstance(message, m.NamedGraph)][-1:]:
         lines += ["== the last graph", _indented(message.json)]
     return "\n".join([*lines, ""])
 

@@ -19,7 +19,7 @@ from placegraph.runtime.errors import ConfigError, PlacegraphError
 from placegraph.runtime.health import StepStats
 from placegraph.runtime.inline import Inline
 from placegraph.runtime.launcher import Launcher
-from placegraph.runtime.messages import Correction, End, Frame, Graph, Health, Keyframe, Map, Message, Pose
+from placegraph.runtime.messages import Correction, End, Frame, Health, Keyframe, Map, Message, Pose
 from placegraph.tools.evaluate import against_given
 from placegraph.tools.map_files.map_folder import GRAPH, make_empty_folder, next_folder, write_run
 from placegraph.tools.run.map_collector import MapCollector
@@ -181,7 +181,7 @@ def _run_processes(
                 progress.add(message)
 
     with _interrupts() as interrupts, Launcher(dataflow, folder) as launcher:
-        for kind in (Pose, Correction, Map, Graph, Health, End):
+        for kind in (Pose, Correction, Map, collector.graph_kind, Health, End):
             launcher.observe(kind, messages.put)
         collector.timer.begin()
         launcher.start(lambda: bool(interrupts))

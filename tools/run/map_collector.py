@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from placegraph.runtime.config import Dataflow
-from placegraph.runtime.messages import Correction, End, Graph, Map, Message, PlaceNames, Pose
+from placegraph.runtime.messages import Correction, End, Graph, Map, Message, NamedGraph, Pose
 from placegraph.tools.map_files.corrected_trajectory import CorrectedTrajectory
 from placegraph.tools.map_files.map_folder import TRAJECTORY, write_map
 from placegraph.tools.map_files.trajectory_file import write_trajectory
@@ -36,15 +36,15 @@ class MapCollector:
     """Collects from the messages of a run what its map folder needs."""
 
     def __init__(self, dataflow: Dataflow) -> None:
-        self._expects_graph = dataflow.producer(Graph) is not None
-        self._expects_names = dataflow.producer(PlaceNames) is not None
+        self.graph_kind = NamedGraph if dataflow.producer(NamedGraph) is not None else Graph
+        self._expects_graph = dataflow.producer(self.graph_kind) is not None
         self.ended = False
         self._frames_of_source = 0
         self.timer = RunTimer()
         self._odometry: list[Pose] = []
         self._corrections = CorrectedTrajectory()
         self.map: Map | None = None
-        self.graph: Graph | None = None
+        self.graph: Graph | NamedGraph | None = None
 
     def add(self, message: Message) -> None:
         """Take any message: poses and corrections are kept, and the newest map and graph."""
@@ -54,7 +54,7 @@ class MapCollector:
             self._corrections.add(message)
         elif isinstance(message, Map):
             self.map = message
-        elif isinstance(message, Graph):
+        elif isinstance(message, self.graph_kind):
             self.graph = message
         elif isinstance(message, End):
             self.ended, self._frames_of_source = True, message.frames
@@ -71,10 +71,10 @@ class MapCollector:
 
     @property
     def complete(self) -> bool:
-        """Whether the run's last graph has come, with names if there will be any; in a run without graphs, the end."""
+        """Whether the run's last graph has come; in a run without graphs, whether the source has ended."""
         if not self._expects_graph:
             return self.ended
-        return self.graph is not None and self.graph.final and (self.graph.named or not self._expects_names)
+        return self.graph is not None and self.graph.final
 
     def write(self, folder: Path) -> None:
         """Write the map folder as far as it is known; geometry and graph are left out when no map came."""

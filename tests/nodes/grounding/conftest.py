@@ -10,7 +10,7 @@ import pytest
 
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.grounding.name_matching import NameMatcher
-from placegraph.runtime.messages import Graph, Question
+from placegraph.runtime.messages import NamedGraph, Question
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 
 
@@ -80,8 +80,12 @@ def make_house(named=True):
     return SceneGraph.of(places + things)
 
 
-def make_graph_message(graph, named=True, revision=1, final=False, frame_id=7):
-    return Graph(frame_id=frame_id, stamp_ns=9, revision=revision, final=final, named=named, json=graph.to_json())
+def make_graph_message(graph, revision=1):
+    # types that stand for a place in the questions, of which the house has two
+    place_types = ("kitchen", "bathroom", "garage", "work area", "dining area")
+    return NamedGraph(
+        frame_id=7, stamp_ns=9, revision=revision, final=False, place_types=place_types, json=graph.to_json()
+    )
 
 
 def make_question(text, viewpoint=(np.nan,) * 3, k=3, mode="rules", question_id="q1"):

@@ -22,7 +22,7 @@ KEYS = {
 @pytest.fixture
 def node(house, graph_message):
     """The node with a graph and without a language model."""
-    made = NODE(GroundingConfig(name_places=False, use_model=False), Context())
+    made = NODE(GroundingConfig(use_model=False), Context())
     made.step(graph_message(house, revision=3))
     return made
 
@@ -98,7 +98,7 @@ def test_the_answer_says_where_to_stand_and_how_to_get_there(house, graph_messag
     ]
     ends = np.array([[3.5, 3.5, 0], [3.5, 1.6, 2.8]])
     stairs = Connection(id="C0", kind="stairs", rooms=("R0", "R2"), ends=ends, width_m=0.9, length_m=4.0)
-    node = NODE(GroundingConfig(name_places=False, use_model=False), Context())
+    node = NODE(GroundingConfig(use_model=False), Context())
     node.step(graph_message(SceneGraph.of(nodes, [stairs])))
     answer = ask(node, "where is the bed?", viewpoint=(0.5, 3.5, 1.5))
     assert answer["approach"] == {"position": [2.0, 1.6, 2.8], "yaw_rad": 1.571}
@@ -144,7 +144,7 @@ def test_every_question_of_the_list_that_needs_no_model(node, ask, questions):
 
 
 def test_equal_questions_give_equal_bytes(house, graph_message, ask):
-    first, second = (NODE(GroundingConfig(name_places=False, use_model=False), Context()) for _ in range(2))
+    first, second = (NODE(GroundingConfig(use_model=False), Context()) for _ in range(2))
     for made in (first, second):
         made.step(graph_message(house))
     ask(first, "the vase near the window upstairs")

@@ -1,5 +1,8 @@
+import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,6 +87,35 @@ def test_replies_are_the_same_in_a_new_process(model):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert bytes.fromhex(done.stdout.strip()) == probabilities(model)
+
+
+def mapping_of_the_model(pid):
+    """Permissions of the model file's mapping in a process, and its sizes in kB by name (proc(5), smaps)."""
+    regions = re.split(r"(?m)^(?=[0-9a-f]+-[0-9a-f]+ )", Path(f"/proc/{pid}/smaps").read_text())
+    (region,) = [region for region in regions if str(default_model_path()) in region.split("\n")[0]]
+    return region.split()[1], {name: int(size) for name, size in re.findall(r"(?m)^(\w+): +(\d+) kB", region)}
+
+
+@pytest.mark.skipif(not Path("/proc/self/smaps").exists(), reason="only Linux says how memory is mapped")
+def test_processes_share_the_pages_of_the_model_file(model):
+    model.complete("Say O1:", "root ::= " + enum_rule(["O1"]), 8)
+    file = os.open(default_model_path(), os.O_RDONLY)
+    os.fsync(file)  # pages of a file that was written just now count as dirty until they are on the disk
+    os.close(file)
+    code = (
+        "from placegraph.runtime.language.language_model import LanguageModel; model = LanguageModel(n_ctx=256);"
+        "model.complete('Say O1:', 'root ::= \"O1\"', 8); print('loaded', flush=True); input()"
+    )
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", code], **pipes) as other:
+        assert other.stdout.readline() == "loaded\n"
+        mappings = [mapping_of_the_model(pid) for pid in ("self", other.pid)]
+        other.communicate("\n")
+    for permissions, kb in mappings:
+        assert permissions == "r--s"  # shared, never written
+        assert kb["Rss"] > 80_000  # of a file of 92 MB: nothing was copied into memory of the process's own
+        assert kb["Private_Dirty"] == kb["Private_Clean"] == kb["Anonymous"] == 0
+        assert kb["Pss"] <= 0.51 * kb["Rss"]
 
 
 def test_what_fits(model):

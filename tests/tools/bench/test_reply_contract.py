@@ -9,7 +9,7 @@ from placegraph.nodes.grounding import Grounding
 from placegraph.runtime.messages import Answer, Question
 from placegraph.tools.bench.reply_contract import fuzz
 
-FAST = {"use_model": False, "name_places": False}
+FAST = {"use_model": False}
 
 
 def test_two_thousand_requests_get_replies_that_keep_the_contract() -> None:

@@ -173,7 +173,7 @@ def test_questions_are_asked_and_scored(cli, perfect, source, tmp_path) -> None:
     ]
     absent = cli("evaluate", perfect, "--source", source, "--questions")
     assert absent.code == 1 and absent.reason.endswith("no questions in truth/questions.json")
-    settings = {"grounding": {"name_places": False, "use_model": False}}
+    settings = {"grounding": {"use_model": False}}
     (perfect / "run.json").write_text(json.dumps({"config": {"run": {}, "nodes": settings}}))
     file = source / "truth" / "questions.json"
     file.write_text(json.dumps(to_json(asked)))

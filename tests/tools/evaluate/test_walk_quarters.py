@@ -71,7 +71,7 @@ def snapshot(source, given, revision, frames, shift, cameras=None):
         object_ids=np.arange(len(points)), object_points_world=np.concatenate(points).astype(np.float32),
         object_point_offsets=8 * np.arange(len(points) + 1),
     )  # fmt: skip
-    return [made, Graph(**age, final=False, named=False, json=SceneGraph.of(nodes).to_json())]
+    return [made, Graph(**age, final=False, json=SceneGraph.of(nodes).to_json())]
 
 
 def record(folder, given, messages):

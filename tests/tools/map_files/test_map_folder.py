@@ -6,7 +6,7 @@ import pytest
 
 from placegraph.runtime.config import RunConfig, RunSettings, build
 from placegraph.runtime.errors import ConfigError, SchemaError
-from placegraph.runtime.messages import End, Graph, LastKeyframe, Map, Pose
+from placegraph.runtime.messages import End, Graph, LastKeyframe, Map, NamedGraph, Pose
 from placegraph.runtime.node import Context, build_node
 from placegraph.tools.map_files.map_folder import (
     find_graph,
@@ -47,8 +47,12 @@ def make_map() -> Map:
     return made
 
 
-def graph(*, final, named):
-    return Graph(frame_id=0, stamp_ns=0, revision=0, final=final, named=named, json="{}")
+def graph(*, final):
+    return Graph(frame_id=0, stamp_ns=0, revision=0, final=final, json="{}")
+
+
+def named_graph(*, final):
+    return NamedGraph(frame_id=0, stamp_ns=0, revision=0, final=final, place_types=(), json="{}")
 
 
 def test_a_trajectory_holds_trusted_poses_by_time(tmp_path) -> None:
@@ -133,18 +137,18 @@ def test_no_run_json(tmp_path) -> None:
     ("nodes", "messages"),
     [
         (START, [End(frame_id=0, stamp_ns=0, frames=1)]),
-        (MAPPING, [graph(final=True, named=False)]),
-        (MAPPING | {"grounding": {"use_model": False, "name_places": False}}, [graph(final=True, named=True)]),
+        (MAPPING, [graph(final=True)]),
+        (MAPPING | {"naming": {}}, [named_graph(final=True)]),
     ],
     ids=["no graph", "no names", "names"],
 )
 def test_complete_when_the_last_of_a_run_has_come(tmp_path, nodes, messages) -> None:
     collector = MapCollector(build(flow(nodes)))
-    for message in (pose(0), graph(final=False, named=True), graph(final=False, named=False)):
+    for message in (pose(0), graph(final=False), named_graph(final=False)):
         collector.add(message)
     assert not collector.complete
-    if "grounding" in nodes:
-        collector.add(graph(final=True, named=False))
+    if "naming" in nodes:
+        collector.add(graph(final=True))
         assert not collector.complete
     for message in messages:
         collector.add(message)

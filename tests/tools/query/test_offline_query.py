@@ -7,7 +7,7 @@ from placegraph.runtime.query.reply import Reply
 from placegraph.runtime.query.request import make_question
 from placegraph.tools.query.offline_query import MAX_OPEN_FILES, OfflineQuery, with_own_ids
 
-FAST = {"use_model": False, "name_places": False}
+FAST = {"use_model": False}
 
 
 def chairs(ids):

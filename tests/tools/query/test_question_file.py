@@ -13,7 +13,7 @@ from placegraph.runtime.errors import ConfigError, QueryError
 from placegraph.tools.query.offline_query import OfflineQuery
 from placegraph.tools.query.question_file import LineAnswerer, answer_all
 
-FAST = {"use_model": False, "name_places": False}
+FAST = {"use_model": False}
 ROOM = {
     "objects": [
         {"id": 3, "tags": ["chair"], "center": [0, 0, 0.5], "size": [0.5, 0.5, 1], "color": "red"},

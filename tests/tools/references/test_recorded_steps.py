@@ -10,7 +10,7 @@ import pytest
 
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.language.language_model import Completion, LanguageModel
-from placegraph.runtime.messages import Answer, Frame, Graph, Keyframe, Pose
+from placegraph.runtime.messages import Answer, Frame, Keyframe, NamedGraph, Pose
 from placegraph.tools.references.recorded_steps import (
     ReferenceRecording,
     _json_differences,
@@ -134,10 +134,10 @@ def test_a_changed_setting_and_an_error_of_ours_are_differences(reference: Refer
     assert differences(reference, "keyframe", translation_m=0.04) == [
         "keyframe: Pose of frame 1 gave [], gives ['Keyframe']"
     ]
-    graph = Graph(frame_id=0, stamp_ns=0, revision=0, final=True, named=False, json="[]")
+    graph = NamedGraph(frame_id=0, stamp_ns=0, revision=0, final=True, place_types=(), json="[]")
     broken = ReferenceRecording({"grounding": {}}, [graph], {"grounding": [(0, [])]}, {})
     (line,) = differences(broken, "grounding")
-    assert line.startswith("grounding: SchemaError: Graph of revision 0: expected graph version")
+    assert line.startswith("grounding: SchemaError: NamedGraph of revision 0: expected graph version")
 
 
 def test_only_the_first_differences_are_listed(reference: ReferenceRecording) -> None:
@@ -200,7 +200,9 @@ def test_the_model_is_whole_again_after_an_error() -> None:
 
 
 def test_the_summary_shows_steps_answers_and_the_graph(reference: ReferenceRecording) -> None:
-    graph = Graph(frame_id=2, stamp_ns=0, revision=0, final=True, named=False, json='{"nodes":[{"box":[1.0,2.5]}]}')
+    graph = NamedGraph(
+        frame_id=2, stamp_ns=0, revision=0, final=True, place_types=(), json='{"nodes":[{"box":[1.0,2.5]}]}'
+    )
     answer = Answer(frame_id=-1, stamp_ns=0, question_id="q7", json='{"status":"found"}')
     text = summary(dataclasses.replace(reference, messages=[*reference.messages, graph, answer]))
     lines = text.splitlines()

@@ -20,10 +20,11 @@ def small(tmp_path_factory) -> Path:
     """A reference of a few small images, without the language model."""
     folder = tmp_path_factory.mktemp("replay")
     with pytest.MonkeyPatch.context() as patch:
-        silent = {"name_places": False, "use_model": False}
+        silent = {"use_model": False}
         patch.setitem(tool.WALK, "camera", {"limit": 12, "settings": {"width": 96, "height": 72}})
         patch.setitem(tool.HOUSE, "camera", {"settings": {"width": 96, "height": 72, "frames": 3}})
         patch.setitem(tool.HOUSE, "grounding", silent)
+        patch.setitem(tool.HOUSE, "naming", {"method": "none"})
         patch.setattr(tool, "QUESTIONS", ("the sofa", ""))
         result = CliRunner().invoke(APP, ["--update", "--folder", str(folder)])
         assert result.exit_code == 0, result.output
@@ -42,7 +43,7 @@ def test_each_node_is_kept_with_its_settings_and_steps(small: Path) -> None:
     assert list(reference.steps) == [*tool.IN_WALK, *tool.IN_HOUSE, *tool.THREE]
     assert reference.settings["pose"] == {"stride": 4}
     assert reference.settings["instances"] == {"model": "drawn_scene"}  # what flat.toml says
-    assert reference.settings["grounding"] == {"name_places": False, "use_model": False}
+    assert reference.settings["grounding"] == {"use_model": False}
     asked = [message.text for message in reference.messages if isinstance(message, Question)]
     assert asked == ["the sofa", ""]
     pose = reference.steps["pose"]
@@ -53,7 +54,7 @@ def test_nothing_differs_from_what_was_just_made(small: Path) -> None:
     result = CliRunner().invoke(APP, ["--folder", str(small)])
     assert result.exit_code == 0
     assert [line.split()[0] for line in result.stdout.splitlines()] == [*tool.IN_WALK, *tool.IN_HOUSE, *tool.THREE]
-    assert result.output.count("as recorded") == 10
+    assert result.output.count("as recorded") == 11
 
 
 def test_a_difference_is_listed_and_is_exit_status_1(small: Path, tmp_path: Path) -> None:
@@ -62,7 +63,7 @@ def test_a_difference_is_listed_and_is_exit_status_1(small: Path, tmp_path: Path
     dataclasses.replace(reference, settings=settings).write(tmp_path / tool.RECORDING)
     result = CliRunner().invoke(APP, ["--folder", str(tmp_path)])
     assert result.exit_code == 1
-    assert result.output.count("as recorded") == 9
+    assert result.output.count("as recorded") == 10
     line = result.output.split("differs\n")[1].splitlines()[0]
     assert line.startswith("  fusion: Correction of frame 2 gives Map(2).") and "was" in line
 

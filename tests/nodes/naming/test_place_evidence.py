@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.place_evidence import ANYWHERE, GROUP_WEIGHTS, REFERENCE_OBJECTS, PlaceEvidence, _table
-from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES
+from placegraph.nodes.naming.place_evidence import ANYWHERE, GROUP_WEIGHTS, REFERENCE_OBJECTS, PlaceEvidence, _table
+from placegraph.nodes.naming.place_types import LOCATION_TYPES, ROOM_TYPES
 
 
 class FakeLogProbabilities:
