@@ -1,4 +1,4 @@
-"""Settings that have another name than in earlier versions, so that an old file is refused with the new key."""
+"""Settings that were renamed or removed, so that an old configuration file is refused with a helpful reason."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ RENAMED_SETTINGS = {
     "hierarchy.locations.least_area_m2": "hierarchy.locations.min_area_m2",
     "hierarchy.locations.least_objects": "hierarchy.locations.min_objects",
     "hierarchy.rooms.least_slice_m": "hierarchy.rooms.min_slice_m",
+    "keyframe.lost_after_s": "keyframe.pose_timeout_s",
     "pose.rgbd.least_inliers": "pose.rgbd.min_inliers",
     "pose.rgbd.least_met": "pose.rgbd.min_met",
     "pose.rgbd.least_share": "pose.rgbd.min_share",
@@ -17,12 +18,7 @@ RENAMED_SETTINGS = {
     "pose_graph.loops.least_likeness": "pose_graph.loops.min_likeness",
 }
 
-
-def setting_error(node: str, path: tuple[str, ...], reason: str) -> str:
-    """One line for a refused setting of a node: `[nodes.<node>] key: reason`, or the new key of a renamed one."""
-    key = ".".join(path)
-    new = RENAMED_SETTINGS.get(f"{node}.{key}")
-    if new is not None:
-        new_node, _, new_key = new.partition(".")
-        reason = f"this setting is now called {new_key}" + (f" of [nodes.{new_node}]" if new_node != node else "")
-    return f"[nodes.{node}] {key}: {reason}"
+# `<node>.<path of keys>` to the reason why there is no such setting any more
+REMOVED_SETTINGS = {
+    "keyframe.in_flight": "the bus bounds the keyframes that wait for slow models",
+}

@@ -16,7 +16,7 @@ FOLDERS = ("configs", "models_onnx", "nodes", "runtime", "tools")
 RING_OF_RUNTIME = {  # a file or a folder of files
     **dict.fromkeys(("errors", "arrays", "messages", "vision", "scene_graph"), 0),
     **dict.fromkeys(("language", "query.request", "query.reply"), 1),
-    **dict.fromkeys(("health", "recording", "node", "renamed_settings", "bus.flow_control"), 1),
+    **dict.fromkeys(("health", "recording", "node", "renamed_settings", "setting_errors", "bus.flow_control"), 1),
     **dict.fromkeys(("config", "bus", "query", "process", "launcher", "inline", "log"), 3),
 }
 RING_OF_FOLDER = {"models_onnx": 1, "nodes": 2, "tools": 4, "configs": 4}

@@ -51,14 +51,14 @@ def _names(kinds: tuple[type[Message], ...], feedback: tuple[type[Message], ...]
 
 def dataflow_table() -> str:
     """Markdown table of the nodes."""
-    rows = ["| node | takes | gives |", "|---|---|---|"]
+    rows = ["| node | inputs | outputs |", "|---|---|---|"]
     rows += [f"| {n} | {_names(t.inputs, t.feedback)} | {_names(t.outputs)} |" for n, t in node_types().items()]
     return "\n".join(rows)
 
 
 def topic_table() -> str:
     """Markdown table of the topics."""
-    rows = ["| message | key | delivery | giver waits when ahead by | recorded |", "|---|---|---|---|---|"]
+    rows = ["| message | key | delivery | producer waits when ahead by | recorded |", "|---|---|---|---|---|"]
     for topic in TOPICS.values():
         credit = str(topic.credit) if topic.credit else "never waits"
         recorded = "yes" if topic.recorded else "no"
