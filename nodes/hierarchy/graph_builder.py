@@ -21,7 +21,7 @@ from placegraph.nodes.hierarchy.rooms import Grid, RoomArea, RoomConfig, find_ro
 from placegraph.nodes.hierarchy.traversability import TravelConfig
 from placegraph.runtime.arrays import F32, F64, Points
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.messages import Map
+from placegraph.runtime.messages import Map, MapObject
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import bounding_box, convex_footprint
 
@@ -61,7 +61,8 @@ class GraphBuilder:
         Raises SchemaError for points that are not finite and objects without points.
         """
         _check(world)
-        objects = np.split(world.object_points_world, world.object_point_offsets[1:-1]) if len(world.object_ids) else []
+        items = world.objects()
+        objects: list[Points] = [item.points for item in items]
         spans = find_floors(world.points_world, world.camera_positions_world, self._config.floors)
         if not spans and objects:  # objects without a cloud: the floor is what they stand on
             spans = find_floors(world.object_points_world, world.camera_positions_world, self._config.floors)
@@ -79,11 +80,11 @@ class GraphBuilder:
             rooms += [HomeRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
         nodes += [_place(room.id, room.floor, room.span, room.area.outline) for room in rooms]
         home = find_homes(objects, rooms)
-        nodes += self._fill(rooms, home, objects, world)
+        nodes += self._fill(rooms, home, objects, items)
         for known in (self._known_rooms, self._known_locations, self._known_footprints):
             known.turn()
         nodes = _with_frames([_building(extents), *nodes])
-        placed = _placed(nodes, {f"O{number}": room.id for number, room in zip(world.object_ids, home, strict=True)})
+        placed = _placed(nodes, {f"O{item.id}": room.id for item, room in zip(items, home, strict=True)})
         places = self._connect(world, list(zip(spans, floor_ids, strict=True)), rooms, placed)
         nodes = [replace(node, approach=places.approaches.get(node.id)) for node in nodes]
         return SceneGraph.of(nodes, places.connections, places.ways)
@@ -113,7 +114,9 @@ class GraphBuilder:
 
         return self._known_rooms.get(digest(points, free, free_cell_m, span.low, span.high), make)
 
-    def _fill(self, rooms: list[HomeRoom], home: list[HomeRoom], objects: list[Points], world: Map) -> list[Node]:
+    def _fill(
+        self, rooms: list[HomeRoom], home: list[HomeRoom], objects: list[Points], items: list[MapObject]
+    ) -> list[Node]:
         """Locations of all rooms, then the objects in them; a room's are found again only when its objects changed."""
         digests = [digest(xyz) for xyz in objects]
         members: dict[str, list[int]] = {room.id: [] for room in rooms}
@@ -128,11 +131,11 @@ class GraphBuilder:
             held = [members[room.id][k] for k in area.members]
             for i in held:
                 parent[i] = location_id
-            box = bounding_box(world.object_boxes_world[held].reshape(-1, 3))
+            box = bounding_box(np.concatenate([items[i].box for i in held]))
             nodes.append(_node(location_id, room.id, box, area.outline))
         for i, key in enumerate(digests):
             footprint = self._known_footprints.get(key, partial(convex_footprint, objects[i]))
-            nodes.append(_object(i, parent[i], footprint, world))
+            nodes.append(_object(items[i], parent[i], footprint))
         return nodes
 
     def _find_locations(
@@ -159,9 +162,9 @@ def _check(world: Map) -> None:
         bad = np.flatnonzero(~np.isfinite(getattr(world, name)).all(axis=1))
         if len(bad):
             raise SchemaError(f"Map {world.revision}: {name}[{bad[0]}] is not finite")
-    empty = np.flatnonzero(np.diff(world.object_point_offsets) <= 0)
-    if len(empty):
-        raise SchemaError(f"Map {world.revision}: object {world.object_ids[empty[0]]} has no points")
+    empty = [item.id for item in world.objects() if not len(item.points)]
+    if empty:
+        raise SchemaError(f"Map {world.revision}: object {empty[0]} has no points")
 
 
 def _in_zone(xyz: Points, span: FloorSpan) -> Points:
@@ -181,20 +184,18 @@ def _place(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tu
     return _node(node_id, parent, box, outline, tags=tags)
 
 
-def _object(i: int, parent: str, footprint: Points, world: Map) -> Node:
-    votes = slice(int(world.tag_offsets[i]), int(world.tag_offsets[i + 1]))
-    names, weights = world.tag_names[votes], world.tag_votes[votes].tolist()
+def _object(item: MapObject, parent: str, footprint: Points) -> Node:
     return _node(
-        f"O{int(world.object_ids[i])}",
+        f"O{item.id}",
         parent,
-        world.object_boxes_world[i],
+        item.box,
         footprint,
-        tags=tuple(Tag(name, weight) for name, weight in zip(names, weights, strict=True)),
-        first_frame=int(world.object_first_frames[i]),
-        last_frame=int(world.object_last_frames[i]),
-        observations=int(world.object_observations[i]),
-        oriented_box=tuple(world.object_oriented_boxes[i].tolist()),
-        color=tuple(world.object_colors[i].tolist()),
+        tags=tuple(Tag(name, votes) for name, votes in item.tags),
+        first_frame=item.first_frame,
+        last_frame=item.last_frame,
+        observations=item.observations,
+        oriented_box=tuple(item.oriented_box.tolist()),
+        color=tuple(item.color.tolist()),
     )
 
 

@@ -68,8 +68,7 @@ def _laid(part: Part | None, given: Mapping[int, F64], where: str) -> tuple[Alig
     ate = against_given(known, given)
     if ate is None:
         return NOTHING, {}
-    pieces = np.split(part.map.object_points_world, part.map.object_point_offsets[1:-1])
-    clouds = {f"O{number}": piece for number, piece in zip(part.map.object_ids.tolist(), pieces, strict=False)}
+    clouds = {f"O{item.id}": item.points for item in part.map.objects()}
     graph = SceneGraph.from_json(part.graph.json)
     laid = aligned(graph, clouds, level_alignment(*paired(known, given)), where)
     share = ate["ate_rmse_m"] / ate["path_m"] if ate["path_m"] else float("nan")
