@@ -16,7 +16,7 @@ from rich.progress import track
 
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError, SchemaError
 from placegraph.runtime.query.reply import error_reply
-from placegraph.runtime.query.request import MAX_BYTES, make_question
+from placegraph.runtime.query.request import make_question, parse_json_object
 from placegraph.runtime.scene_graph.object_list import SourceId
 from placegraph.tools.answerer import Answerer
 
@@ -60,7 +60,7 @@ class Batch:
         """The answer to a line; an error tells its number. Raises ModelError and ConfigError: no line can be asked."""
         question_id: SourceId | None = None
         try:
-            fields = _fields(line)
+            fields = parse_json_object(line, '{"id": "...", "text": "..."}')
             question_id = _id(fields)
             reply = self._ask(fields)
         except (QueryError, SchemaError) as error:
@@ -89,20 +89,6 @@ class Batch:
             return self._answerer.ask(path, question)
         except OSError as error:  # a path that cannot be one: too long
             raise QueryError(f"graph: {error.strerror}") from None
-
-
-def _fields(line: bytes) -> dict[str, Any]:
-    if len(line) > MAX_BYTES:
-        raise QueryError(f"{len(line)} bytes; at most {MAX_BYTES} are read")
-    try:
-        fields = json.loads(line.decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise QueryError("not UTF-8") from None
-    except (ValueError, RecursionError):
-        raise QueryError('not JSON; expected {"id": "...", "text": "..."}') from None
-    if not isinstance(fields, dict):
-        raise QueryError(f'expected an object like {{"id": "...", "text": "..."}}, got {type(fields).__name__}')
-    return fields
 
 
 def _id(fields: dict[str, Any]) -> SourceId:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -19,19 +20,23 @@ def graph(
         Path | None, typer.Argument(metavar="MAP", help="A map folder or graph file: print its graph instead.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the graph's canonical JSON.")] = False,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of graph.json.")] = False,
 ) -> None:
-    """Print which node takes and gives which message; with MAP, its building, floors, rooms, locations, objects."""
+    """Print the inputs and outputs of all nodes; with MAP, its building, floors, rooms, locations, objects."""
+    if schema:
+        print(json.dumps(SceneGraph.json_schema(), indent=1))
+        return
     if map_folder is None:
         print(dataflow_table())
         print()
         print(topic_table())
         return
-    found = SceneGraph.load(find_graph(map_folder))
-    print(found.to_json() if as_json else tree(found))
+    scene_graph = SceneGraph.load(find_graph(map_folder))
+    print(scene_graph.to_json() if as_json else tree(scene_graph))
 
 
 def node_types() -> dict[str, type[Node]]:
-    """Every node class by name, in the order of the dataflow (givers before takers, by name otherwise)."""
+    """Every node class by name, in the order of the dataflow (producers before consumers, by name otherwise)."""
     types: dict[str, type[Node]] = {name: plugin(NODES, name, "NODE", "node") for name in available(NODES)}
     order: list[str] = []
     waiting = sorted(types)

@@ -17,7 +17,6 @@ from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Question
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.runtime.scene_graph.place_graph import approach_to_dict
 from placegraph.runtime.scene_graph.route import find_route
 
 NO_WAY: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
@@ -107,8 +106,9 @@ def _way_to(graph: SceneGraph, node: Node, asker_world: F64) -> dict[str, Any]:
 
     To an object that cannot be approached the way into its room, as far as its middle; 0 m for who is there already.
     """
-    approach = approach_to_dict(node.approach)
-    way = NO_WAY | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
+    way = dict(NO_WAY)
+    if (approach := node.approach) is not None:
+        way["approach"] = {"position": numbers(approach.position), "yaw_rad": numbers(approach.yaw_rad)}
     if not np.isfinite(asker_world).all():
         return way
     room = graph.room_of(node.id)

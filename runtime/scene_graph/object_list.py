@@ -25,6 +25,7 @@ from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, mod
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Tag
+from placegraph.runtime.validation import first_error
 
 logger = logging.getLogger(__name__)
 
@@ -189,10 +190,7 @@ def parse_object_list(data: object, where: str) -> ObjectList:
     try:
         listed = ObjectList.model_validate(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        at = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
-        reason = first["msg"].removeprefix("Value error, ")
-        raise SchemaError(": ".join(part for part in (where, at, reason) if part)) from None
+        raise SchemaError(f"{where}: {first_error(error)}") from None
     for layer in ("objects", "rooms", "floors"):
         seen: dict[SourceId, int] = {}
         for i, entry in enumerate(getattr(listed, layer) or ()):
