@@ -27,12 +27,10 @@ class RunSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
-    out_dir: str = Field(
-        default="out", min_length=1
-    )  # runs are written to <out_dir>/<name>; relative to the current folder
-    threads: int = Field(
-        default=1, ge=1
-    )  # for each library that has threads of its own; more than 1 can change the last bits
+    # runs are written to <out_dir>/<name>; relative to the current folder
+    out_dir: str = Field(default="out", min_length=1)
+    # for each library that has threads of its own; more than 1 can change the last bits
+    threads: int = Field(default=1, ge=1)
     model_dirs: list[str] = []  # folders with weights, relative to the dataflow file
     # a question that takes longer is answered with an error
     question_timeout_s: float = Field(default=30.0, gt=0, allow_inf_nan=False, le=threading.TIMEOUT_MAX)

@@ -1,8 +1,15 @@
-"""One line for data from outside that a pydantic model refuses."""
+"""What checks of data from outside share: limits, and one line for what a pydantic model refuses."""
 
 from __future__ import annotations
 
 from pydantic import ValidationError
+
+MAX_COORDINATE_M = 1e6  # no building is larger, and no sum of squares overflows; chosen by hand
+
+
+def is_unicode(text: str) -> bool:
+    """Whether UTF-8 can encode a text: JSON can also spell half of a surrogate pair, which is no character."""
+    return not any("\ud800" <= character <= "\udfff" for character in text)
 
 
 def first_error(error: ValidationError) -> str:

@@ -18,6 +18,7 @@ from placegraph.runtime.errors import ConfigError, ModelError, QueryError, Schem
 from placegraph.runtime.query.reply import error_reply
 from placegraph.runtime.query.request import make_question, parse_json_object
 from placegraph.runtime.scene_graph.object_list import SourceId
+from placegraph.runtime.validation import is_unicode
 from placegraph.tools.answerer import Answerer
 
 logger = logging.getLogger(__name__)
@@ -95,7 +96,7 @@ def _id(fields: dict[str, Any]) -> SourceId:
     own = fields.get("id")
     if type(own) is int:
         return own
-    if not isinstance(own, str) or not own or any("\ud800" <= character <= "\udfff" for character in own):
+    if not isinstance(own, str) or not own or not is_unicode(own):
         raise QueryError("id: expected text that is not empty, or a whole number")
     return own
 

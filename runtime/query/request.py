@@ -12,13 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
+from placegraph.runtime.validation import MAX_COORDINATE_M
 
 MAX_BYTES = 65_536  # of a request; more is refused unread
 # all chosen by hand
 MAX_TEXT = 500  # characters; longer is not a question but a document
 MAX_ID = 100  # characters
 MAX_CANDIDATES = 50
-MAX_COORDINATE_M = 1e6  # no building is larger, and no sum of squares overflows
 # parsed by the language model, by phrase rules, or asked of the model level by level
 Mode = Literal["program", "rules", "deductive"]
 MODES: tuple[str, ...] = get_args(Mode)
