@@ -34,7 +34,7 @@ from pydantic_core import CoreSchema
 
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.scene_graph.json_types import Box, Numbers, Outline, Tags
+from placegraph.runtime.scene_graph.json_types import Box, Numbers, Outline, Tag
 from placegraph.runtime.scene_graph.node_ids import LAYERS, PARENT_LAYERS, NodeId, id_key
 from placegraph.runtime.scene_graph.place_graph import (
     Approach,
@@ -57,7 +57,7 @@ class Node:
 
     id: NodeId
     parent: str  # "" for the building
-    tags: Tags  # strongest first
+    tags: tuple[Tag, ...]  # strongest first
     box: Box
     footprint: Outline
     first_frame: int  # -1: not tied to frames

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
@@ -11,14 +10,6 @@ from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 from placegraph.runtime.arrays import F64
 
 MM = 3  # decimals of lengths in metres
-
-
-@dataclass(frozen=True)
-class Tag:
-    """One name of a node and the weight of the evidence for it (summed votes for objects, probability for places)."""
-
-    name: str
-    weight: float
 
 
 def rounded(values: Any, digits: int) -> Any:
@@ -48,15 +39,11 @@ def _array(rows: int | None, columns: int) -> tuple[PlainValidator, PlainSeriali
     )
 
 
-def _read_tags(value: Any) -> tuple[Tag, ...]:
-    try:
-        return tuple(Tag(str(name), float(weight)) for name, weight in value)
-    except (TypeError, ValueError):
-        raise ValueError("expected a list of [name, weight]") from None
+class Tag(NamedTuple):
+    """One name of a node and the weight of the evidence for it (summed votes for objects, probability for places)."""
 
-
-def _write_tags(tags: tuple[Tag, ...]) -> list[list[Any]]:
-    return [[tag.name, weight] for tag, weight in zip(tags, rounded([tag.weight for tag in tags], 4), strict=True)]
+    name: str
+    weight: Annotated[float, PlainSerializer(lambda weight: rounded(weight, 4))]
 
 
 def _read_lengths(value: Any) -> tuple[tuple[str, float], ...]:
@@ -70,7 +57,6 @@ def _write_lengths(lengths: tuple[tuple[str, float], ...]) -> dict[str, float]:
     return dict(zip([end for end, _ in lengths], _to_mm([length for _, length in lengths]), strict=True))
 
 
-_TAG_SCHEMA = {"type": "array", "prefixItems": [{"type": "string"}, {"type": "number"}], "items": False}
 _LENGTHS_SCHEMA = {"type": "object", "additionalProperties": {"type": "number"}}
 
 Box = Annotated[F64, *_array(2, 3)]  # min and max; or the two ends of a connection
@@ -79,12 +65,6 @@ Metres = Annotated[float, PlainSerializer(_to_mm)]
 Radians = Metres  # to 3 decimals as well
 Numbers = Annotated[tuple[float, ...], PlainSerializer(_to_mm)]
 Position = Annotated[tuple[float, float, float], PlainSerializer(_to_mm)]
-Tags = Annotated[
-    tuple[Tag, ...],
-    PlainValidator(_read_tags),
-    PlainSerializer(_write_tags),
-    WithJsonSchema({"type": "array", "items": _TAG_SCHEMA}),
-]
 LengthsById = Annotated[
     tuple[tuple[str, float], ...],
     PlainValidator(_read_lengths),

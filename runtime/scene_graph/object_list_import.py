@@ -120,8 +120,8 @@ def _node(
 ) -> Node:
     (x0, y0, _), (x1, y1, _) = box.tolist()
     footprint = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) if outline is None else outline
-    frames = {"first_frame": -1, "last_frame": -1}
-    return Node(id=node_id, parent=parent, tags=tags, box=box, footprint=footprint, **frames, **fields)
+    fields |= {"first_frame": -1, "last_frame": -1}
+    return Node(id=node_id, parent=parent, tags=tags, box=box, footprint=footprint, **fields)
 
 
 def _places(listed: ObjectList, boxes: F64) -> tuple[list[_PlaceDraft], list[_PlaceDraft], list[int]]:
