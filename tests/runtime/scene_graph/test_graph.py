@@ -77,7 +77,7 @@ def test_rounding_and_minus_zero() -> None:
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("", "Invalid JSON"),
+        ("", "not JSON"),
         ("[]", "Input should be an object"),
         ('{"version": 1}', "expected graph version 2, found 1"),
         ('{"version": 3}', "expected graph version 2, found 3"),
