@@ -58,7 +58,7 @@ class SegmenterNode(Node):
 
     def _segment(self, keyframe: Keyframe, detections: Detections) -> Segments:
         kept = np.flatnonzero(detections.scores >= self.config.min_score)[: self.config.max_objects]
-        depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
+        depth_m = keyframe.depth_m
         masks = self._model.segment(keyframe.color, depth_m, detections.boxes_px[kept])
         return pack_segments(keyframe, [detections.names[i] for i in kept.tolist()], detections.scores[kept], masks)
 

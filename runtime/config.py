@@ -16,6 +16,7 @@ from placegraph.runtime.bus.session import BusConfig
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Health, Message, Question
 from placegraph.runtime.node import NODES, Context, Node, Source, available, build_node, plugin
+from placegraph.runtime.setting_errors import first_problem
 
 # Published by the shells, not by a node: requests from outside, and each process's report on itself.
 PRODUCED_BY_SHELL: tuple[type[Message], ...] = (Health, Question)
@@ -26,12 +27,10 @@ class RunSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
-    out_dir: str = Field(
-        default="out", min_length=1
-    )  # runs are written to <out_dir>/<name>; relative to the current folder
-    threads: int = Field(
-        default=1, ge=1
-    )  # for each library that has threads of its own; more than 1 can change the last bits
+    # runs are written to <out_dir>/<name>; relative to the current folder
+    out_dir: str = Field(default="out", min_length=1)
+    # for each library that has threads of its own; more than 1 can change the last bits
+    threads: int = Field(default=1, ge=1)
     model_dirs: list[str] = []  # folders with weights, relative to the dataflow file
     # a question that takes longer is answered with an error
     question_timeout_s: float = Field(default=30.0, gt=0, allow_inf_nan=False, le=threading.TIMEOUT_MAX)
@@ -62,7 +61,8 @@ def read(path: Path) -> RunConfig:
     try:
         config = RunConfig.model_validate(data)
     except ValidationError as error:
-        raise ConfigError(f"{path}: {_first_problem(error)}") from None
+        (section, *keys), reason = first_problem(error, RunConfig)
+        raise ConfigError(f"{path}: [{section}]{' ' if keys else ''}{'.'.join(keys)}: {reason}") from None
     folders = [str((path.parent / folder).resolve()) for folder in config.run.model_dirs]
     return config.model_copy(update={"run": config.run.model_copy(update={"model_dirs": folders})})
 
@@ -70,13 +70,6 @@ def read(path: Path) -> RunConfig:
 def packaged_names() -> list[str]:
     """Names of the dataflow files that come with placegraph."""
     return sorted(item.name for item in resources.files("placegraph.configs").iterdir() if item.name.endswith(".toml"))
-
-
-def _first_problem(error: ValidationError) -> str:
-    problems = error.errors()  # an unknown section first: a misspelt one is also reported as missing
-    first = next((problem for problem in problems if problem["type"] == "extra_forbidden"), problems[0])
-    section, *keys = [str(part) for part in first["loc"]]
-    return f"[{section}]{' ' if keys else ''}{'.'.join(keys)}: {first['msg']}"
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.messages import Message
-from placegraph.runtime.renamed_settings import setting_error
+from placegraph.runtime.setting_errors import node_setting_error
 
 NODES = "placegraph.nodes"
 EXTRAS = {"depthai": "oak", "embreex": "demo"}  # which extra brings an optional package
@@ -125,6 +125,5 @@ def build_node(name: str, settings: dict[str, Any], context: Context) -> Node:
     try:
         config = node_type.config_type.model_validate(settings)
     except ValidationError as error:
-        first = error.errors()[0]
-        raise ConfigError(setting_error(name, tuple(map(str, first["loc"])), first["msg"])) from None
+        raise ConfigError(node_setting_error(name, error, node_type.config_type)) from None
     return node_type(config, context)

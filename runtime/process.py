@@ -120,6 +120,8 @@ class NodeProcess:
         """Step what is in the inbox, then end; a source ends as if its data had ended."""
         if isinstance(self.node, Source):
             self.node.ending = True
+        for window in self.windows.values():
+            window.ignore_absent()
         self.started.set()
         self.inbox.close()
 

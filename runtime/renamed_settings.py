@@ -1,4 +1,4 @@
-"""Settings that have another name than in earlier versions, so that an old file is refused with the new key."""
+"""Settings that were renamed or removed, so that an old configuration file is refused with a helpful reason."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ RENAMED_SETTINGS = {
     "hierarchy.locations.least_objects": "hierarchy.locations.min_objects",
     "hierarchy.rooms.least_slice_m": "hierarchy.rooms.min_slice_m",
     "hierarchy.travel": "hierarchy.traversability",
+    "keyframe.lost_after_s": "keyframe.pose_timeout_s",
     "pose.rgbd.coast_s": "pose.rgbd.max_coasting_s",
     "pose.rgbd.features.keypoints": "pose.rgbd.features.max_keypoints",
     "pose.rgbd.features.least_inliers": "pose.rgbd.features.min_inliers",
@@ -71,12 +72,7 @@ RENAMED_SETTINGS = {
     "pose_graph.slack": "pose_graph.keyframes_before_loop",
 }
 
-
-def setting_error(node: str, path: tuple[str, ...], reason: str) -> str:
-    """One line for a refused setting of a node: `[nodes.<node>] key: reason`, or the new key of a renamed one."""
-    key = ".".join(path)
-    new = RENAMED_SETTINGS.get(f"{node}.{key}")
-    if new is not None:
-        new_node, _, new_key = new.partition(".")
-        reason = f"this setting is now called {new_key}" + (f" of [nodes.{new_node}]" if new_node != node else "")
-    return f"[nodes.{node}] {key}: {reason}"
+# `<node>.<path of keys>` to the reason why there is no such setting any more
+REMOVED_SETTINGS = {
+    "keyframe.in_flight": "the bus bounds the keyframes that wait for slow models",
+}

@@ -14,9 +14,9 @@ from placegraph.tools.graph import dataflow_table, node_types, topic_table
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("configs", "models_onnx", "nodes", "runtime", "tools")
 RING_OF_RUNTIME = {  # a file or a folder of files
-    **dict.fromkeys(("errors", "arrays", "messages", "vision", "scene_graph"), 0),
+    **dict.fromkeys(("errors", "arrays", "validation", "messages", "vision", "scene_graph"), 0),
     **dict.fromkeys(("language", "query.request", "query.reply"), 1),
-    **dict.fromkeys(("health", "recording", "node", "renamed_settings", "bus.flow_control"), 1),
+    **dict.fromkeys(("health", "recording", "node", "renamed_settings", "setting_errors", "bus.flow_control"), 1),
     **dict.fromkeys(("config", "bus", "query", "process", "launcher", "inline", "log"), 3),
 }
 RING_OF_FOLDER = {"models_onnx": 1, "nodes": 2, "tools": 4, "configs": 4}

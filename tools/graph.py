@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -19,8 +20,12 @@ def graph(
         Path | None, typer.Argument(metavar="MAP", help="A map folder or graph file: print its graph instead.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the graph's canonical JSON.")] = False,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of graph.json.")] = False,
 ) -> None:
-    """Print which node takes and gives which message; with MAP, its building, floors, rooms, locations, objects."""
+    """Print the inputs and outputs of all nodes; with MAP, its building, floors, rooms, locations, objects."""
+    if schema:
+        print(json.dumps(SceneGraph.json_schema(), indent=1))
+        return
     if map_folder is None:
         print(dataflow_table())
         print()
@@ -51,14 +56,14 @@ def _names(kinds: tuple[type[Message], ...], feedback: tuple[type[Message], ...]
 
 def dataflow_table() -> str:
     """Markdown table of the nodes."""
-    rows = ["| node | takes | gives |", "|---|---|---|"]
+    rows = ["| node | inputs | outputs |", "|---|---|---|"]
     rows += [f"| {n} | {_names(t.inputs, t.feedback)} | {_names(t.outputs)} |" for n, t in node_types().items()]
     return "\n".join(rows)
 
 
 def topic_table() -> str:
     """Markdown table of the topics."""
-    rows = ["| message | key | delivery | giver waits when ahead by | recorded |", "|---|---|---|---|---|"]
+    rows = ["| message | key | delivery | producer waits when ahead by | recorded |", "|---|---|---|---|---|"]
     for topic in TOPICS.values():
         credit = str(topic.credit) if topic.credit else "never waits"
         recorded = "yes" if topic.recorded else "no"

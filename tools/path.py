@@ -11,7 +11,7 @@ import typer
 
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.runtime.scene_graph.place_graph import rounded
+from placegraph.runtime.scene_graph.json_types import rounded
 from placegraph.runtime.scene_graph.route import Route, find_route
 from placegraph.tools.map_files.map_folder import find_graph
 

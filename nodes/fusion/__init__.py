@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.fusion.map_message import object_fields
+from placegraph.nodes.fusion.map_message import map_objects
 from placegraph.nodes.fusion.mask_lifting import LiftConfig, lift_masks
 from placegraph.nodes.fusion.object_association import AssociationConfig, KeyframeStamp, ObjectMap
 from placegraph.nodes.fusion.object_cloud import VoxelContext
@@ -19,7 +19,7 @@ from placegraph.nodes.fusion.visibility import DepthVisibility, VisibilityConfig
 from placegraph.nodes.fusion.voxel_map import FreeSpace, VoxelMap, depth_edges
 from placegraph.runtime.arrays import F32
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.messages import Correction, Keyframe, LastKeyframe, Map, Message, Segments
+from placegraph.runtime.messages import Correction, Keyframe, LastKeyframe, Map, Message, Segments, pack_objects
 from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.vision.geometry import backproject, is_rigid, transform
@@ -115,7 +115,7 @@ class FusionNode(Node):
         pose = keyframe.world_from_camera
         if not is_rigid(pose):
             raise SchemaError(f"Keyframe {keyframe.frame_id}: world_from_camera is not a finite rigid transform")
-        depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
+        depth_m = keyframe.depth_m
         edges = depth_edges(depth_m, self.config.edge_ratio)
         visibility = DepthVisibility(depth_m, edges, keyframe.intrinsics, pose, self.config.visibility)
         self._voxels.remove_seen_through(visibility)
@@ -176,7 +176,7 @@ class FusionNode(Node):
             free_cell_m=c.free_cell_m,
             free_points_world=self._free.points(),
             camera_positions_world=self._submaps.positions.astype(np.float32),
-            **object_fields(self._objects, self._is_stable, c.lift),
+            **pack_objects(*map_objects(self._objects, self._is_stable, c.lift)),
         )
 
 

@@ -51,7 +51,7 @@ class KeyframeStamp(NamedTuple):
     submap: int = 0
 
 
-class RetiredObject(NamedTuple):
+class RetiredInstance(NamedTuple):
     """An object that is no longer where it was, and the frame that made it certain."""
 
     instance: ObjectInstance
@@ -63,7 +63,7 @@ class ObjectMap:
 
     def __init__(self, encode: Encode, context: VoxelContext, config: AssociationConfig) -> None:
         self.instances: dict[int, ObjectInstance] = {}
-        self.retired: dict[int, RetiredObject] = {}
+        self.retired: dict[int, RetiredInstance] = {}
         self._encode = encode
         self._config = config
         self._context = context
@@ -133,7 +133,7 @@ class ObjectMap:
     def retire_absent(self, views: int, frame_id: int) -> None:
         """Retire the objects that so many keyframes have seen through since they were last seen."""
         for object_id in [i for i, instance in self.instances.items() if instance.times_absent >= views]:
-            self.retired[object_id] = RetiredObject(self.instances[object_id], frame_id)
+            self.retired[object_id] = RetiredInstance(self.instances[object_id], frame_id)
             self._remove(object_id, None)
 
     def move_submaps(self, moves: Mapping[int, F64], keyframe: int) -> None:

@@ -17,7 +17,6 @@ from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Question
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.runtime.scene_graph.place_graph import approach_to_dict
 from placegraph.runtime.scene_graph.route import find_route
 
 NO_ROUTE: dict[str, Any] = {"approach": None, "route": [], "travel_m": None}
@@ -109,8 +108,9 @@ def _route_fields(graph: SceneGraph, node: Node, asker_world: F64) -> dict[str, 
 
     When the object itself cannot be reached, the route leads to the centre of its room.
     """
-    approach = approach_to_dict(node.approach)
-    fields = NO_ROUTE | {"approach": approach and {name: approach[name] for name in ("position", "yaw_rad")}}
+    fields = dict(NO_ROUTE)
+    if (approach := node.approach) is not None:
+        fields["approach"] = {"position": numbers(approach.position), "yaw_rad": numbers(approach.yaw_rad)}
     if not np.isfinite(asker_world).all():
         return fields
     room = graph.room_of(node.id)

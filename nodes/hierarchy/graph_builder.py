@@ -22,7 +22,7 @@ from placegraph.nodes.hierarchy.rooms import RoomArea, RoomConfig, find_rooms
 from placegraph.nodes.hierarchy.traversability import TraversabilityConfig
 from placegraph.runtime.arrays import F32, F64, Points
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.messages import Map
+from placegraph.runtime.messages import Map, MapObject
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import bounding_box, convex_footprint
 
@@ -62,7 +62,8 @@ class GraphBuilder:
         Raises SchemaError for points that are not finite and objects without points.
         """
         _check(map_)
-        objects = np.split(map_.object_points_world, map_.object_point_offsets[1:-1]) if len(map_.object_ids) else []
+        items = map_.objects()
+        objects: list[Points] = [item.points for item in items]
         spans = find_floors(map_.points_world, map_.camera_positions_world, self._config.floors)
         if not spans and objects:  # objects without a cloud: the floor is what they stand on
             spans = find_floors(map_.object_points_world, map_.camera_positions_world, self._config.floors)
@@ -82,11 +83,11 @@ class GraphBuilder:
             rooms += [FloorRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
         nodes += [_place_node(room.id, room.floor_id, room.span, room.area.outline) for room in rooms]
         object_rooms = assign_rooms(objects, rooms)
-        nodes += self._location_and_object_nodes(rooms, object_rooms, objects, map_)
+        nodes += self._location_and_object_nodes(rooms, object_rooms, objects, items)
         for memo in (self._room_memo, self._location_memo, self._footprint_memo):
             memo.end_build()
         nodes = _with_frames([_building_node(extents), *nodes])
-        room_ids = {f"O{number}": room.id for number, room in zip(map_.object_ids, object_rooms, strict=True)}
+        room_ids = {f"O{item.id}": room.id for item, room in zip(items, object_rooms, strict=True)}
         placed = [
             PlacedObject(node.id, room_ids[node.id], ApproachTarget(node.footprint, node.center))
             for node in nodes
@@ -122,7 +123,7 @@ class GraphBuilder:
         return self._room_memo.get(digest(points, free, free_cell_m, span.low, span.high), compute)
 
     def _location_and_object_nodes(
-        self, rooms: list[FloorRoom], object_rooms: list[FloorRoom], objects: list[Points], map_: Map
+        self, rooms: list[FloorRoom], object_rooms: list[FloorRoom], objects: list[Points], items: list[MapObject]
     ) -> list[Node]:
         """Locations of all rooms, then all objects; a room's are found again only when its objects changed."""
         digests = [digest(xyz) for xyz in objects]
@@ -140,11 +141,11 @@ class GraphBuilder:
             members = [in_room[room.id][k] for k in area.members]
             for i in members:
                 parents[i] = location_id
-            box = bounding_box(map_.object_boxes_world[members].reshape(-1, 3))
+            box = bounding_box(np.concatenate([items[i].box for i in members]))
             nodes.append(_node(location_id, room.id, box, area.outline))
         for i, key in enumerate(digests):
             footprint = self._footprint_memo.get(key, partial(convex_footprint, objects[i]))
-            nodes.append(_object_node(i, parents[i], footprint, map_))
+            nodes.append(_object_node(items[i], parents[i], footprint))
         return nodes
 
     def _find_locations(
@@ -161,9 +162,9 @@ def _check(map_: Map) -> None:
         bad = np.flatnonzero(~np.isfinite(getattr(map_, name)).all(axis=1))
         if len(bad):
             raise SchemaError(f"Map {map_.revision}: {name}[{bad[0]}] is not finite")
-    empty = np.flatnonzero(np.diff(map_.object_point_offsets) <= 0)
-    if len(empty):
-        raise SchemaError(f"Map {map_.revision}: object {map_.object_ids[empty[0]]} has no points")
+    empty = [item.id for item in map_.objects() if not len(item.points)]
+    if empty:
+        raise SchemaError(f"Map {map_.revision}: object {empty[0]} has no points")
 
 
 def _in_zone(xyz: Points, span: FloorSpan) -> Points:
@@ -184,20 +185,18 @@ def _place_node(node_id: str, parent: str, span: FloorSpan, outline: Points, tag
     return _node(node_id, parent, box, outline, tags=tags)
 
 
-def _object_node(i: int, parent: str, footprint: Points, map_: Map) -> Node:
-    votes = slice(int(map_.tag_offsets[i]), int(map_.tag_offsets[i + 1]))
-    names, weights = map_.tag_names[votes], map_.tag_votes[votes].tolist()
+def _object_node(item: MapObject, parent: str, footprint: Points) -> Node:
     return _node(
-        f"O{int(map_.object_ids[i])}",
+        f"O{item.id}",
         parent,
-        map_.object_boxes_world[i],
+        item.box,
         footprint,
-        tags=tuple(Tag(name, weight) for name, weight in zip(names, weights, strict=True)),
-        first_frame=int(map_.object_first_frames[i]),
-        last_frame=int(map_.object_last_frames[i]),
-        observations=int(map_.object_observations[i]),
-        oriented_box=tuple(map_.object_oriented_boxes[i].tolist()),
-        color=tuple(map_.object_colors[i].tolist()),
+        tags=tuple(Tag(name, votes) for name, votes in item.tags),
+        first_frame=item.first_frame,
+        last_frame=item.last_frame,
+        observations=item.observations,
+        oriented_box=tuple(item.oriented_box.tolist()),
+        color=tuple(item.color.tolist()),
     )
 
 

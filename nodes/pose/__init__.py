@@ -52,7 +52,7 @@ class PoseNode(Node):
         if isinstance(message, End):
             return self._release()
         assert isinstance(message, Frame)
-        depth_m = message.depth * np.float32(message.depth_unit_m)
+        depth_m = message.depth_m
         pose = Pose(frame_id=message.frame_id, stamp_ns=message.stamp_ns, **self._estimate(message, depth_m))
         if self._world_from_start is not None:
             return [self._in_world(pose)]

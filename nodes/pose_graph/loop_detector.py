@@ -75,7 +75,7 @@ class LoopDetector:
                 self.layouts.append(np.zeros_like(self.layouts[-1]))
                 return None
         self._last_pose = world_from_camera
-        depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
+        depth_m = keyframe.depth_m
         gray = np.asarray(cv2.cvtColor(keyframe.color, cv2.COLOR_RGB2GRAY), np.uint8)
         features = extract_features(gray, depth_m, keyframe.intrinsics, self.config.features)
         self.features.append(features)

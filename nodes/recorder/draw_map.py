@@ -57,17 +57,11 @@ def draw_map(canvas: Canvas, map_: m.Map, pngs: dict[str, bytes]) -> None:
         canvas.log(path, rr.Points3D(points[part], colors=colors[part], radii=radius_m))
     # "world/path" stays where odometry put it; this path moves with the map
     canvas.log("world/keyframes", rr.LineStrips3D([map_.camera_positions_world], colors=[CORRECTED], radii=[0.012]))
-    canvas.replace("objects", {f"world/objects/O{i}": box for i, box in _object_boxes(map_)})
+    canvas.replace("objects", {f"world/objects/O{item.id}": _object_box(item) for item in map_.objects()})
 
 
-def _object_boxes(map_: m.Map) -> list[tuple[int, rr.Boxes3D]]:
-    boxes = []
-    for i, object_id in enumerate(map_.object_ids.tolist()):
-        first, end = map_.tag_offsets[i : i + 2].tolist()
-        name = map_.tag_names[first] if end > first else "object"
-        oriented = map_.object_oriented_boxes[i].astype(float)
-        boxes.append((object_id, named_box(oriented, f"{name} O{object_id}", color_of(name))))
-    return boxes
+def _object_box(item: m.MapObject) -> rr.Boxes3D:
+    return named_box(item.oriented_box.astype(float), f"{item.name} O{item.id}", color_of(item.name))
 
 
 def named_box(oriented: F64, label: str, color: tuple[int, int, int], radius_m: float = 0.006) -> rr.Boxes3D:

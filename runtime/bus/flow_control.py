@@ -85,6 +85,7 @@ class CreditWindow:
         self._size = size
         self._confirmed = dict.fromkeys(consumers, 0)
         self._absent: set[str] = set()
+        self._wait_for_absent = True
         self._sent = 0
         self._changed = threading.Condition()
 
@@ -97,7 +98,8 @@ class CreditWindow:
             return self._sent
 
     def _is_open(self) -> bool:
-        lags = [self._sent - count for consumer, count in self._confirmed.items() if consumer not in self._absent]
+        ignored = set() if self._wait_for_absent else self._absent
+        lags = [self._sent - count for consumer, count in self._confirmed.items() if consumer not in ignored]
         return not lags or max(lags) < self._size
 
     def confirm(self, consumer: str, sequence: int) -> None:
@@ -108,22 +110,21 @@ class CreditWindow:
                 self._changed.notify_all()
 
     def set_present(self, consumer: str, present: bool) -> None:
-        """Stop waiting for a consumer that died, or wait again for one that came back; what it missed is confirmed."""
+        """Note that a consumer died, or is back: then what it missed counts as confirmed.
+
+        The producer waits for a dead consumer, too: it is started again, and meanwhile the others must not pile up
+        what they match with its messages.
+        """
         with self._changed:
-            if consumer not in self._confirmed:
-                return
             if present and consumer in self._absent:
-                self._absent.discard(consumer)
                 self._confirmed[consumer] = self._sent
-            elif not present:
+                self._absent.discard(consumer)
+            elif not present and consumer in self._confirmed:
                 self._absent.add(consumer)
             self._changed.notify_all()
 
-    def unconfirmed(self) -> list[str]:
-        """Consumers that have not confirmed everything sent."""
+    def ignore_absent(self) -> None:
+        """Stop waiting for dead consumers: the run ends, and they are not started again."""
         with self._changed:
-            return sorted(
-                consumer
-                for consumer, count in self._confirmed.items()
-                if count < self._sent and consumer not in self._absent
-            )
+            self._wait_for_absent = False
+            self._changed.notify_all()

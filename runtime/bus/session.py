@@ -48,17 +48,10 @@ class IncomingQuery:
 
     def reply(self, payload: bytes) -> None:
         """Send the reply; the client's `ask` returns."""
-        self._finish(lambda query: query.reply(query.key_expr, payload, encoding="application/json"))
-
-    def fail(self, payload: bytes) -> None:
-        """Send an error; the client's `ask` returns it as its reply."""
-        self._finish(lambda query: query.reply_err(payload, encoding="application/json"))
-
-    def _finish(self, send: Callable[[Any], None]) -> None:
         query, self._query = self._query, None
         if query is not None:
             with query:  # the client waits as long as a reference to the query is alive
-                send(query)
+                query.reply(query.key_expr, payload, encoding="application/json")
 
 
 class Bus:

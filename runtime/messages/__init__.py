@@ -12,14 +12,17 @@ from placegraph.runtime.messages.definitions import (
     Keyframe,
     LastKeyframe,
     Map,
+    MapObject,
     Message,
     NamedGraph,
     Pose,
     Question,
+    RetiredObject,
     Segments,
     Tags,
     all_kinds,
     array,
+    pack_objects,
 )
 
 __all__ = [
@@ -34,12 +37,15 @@ __all__ = [
     "Keyframe",
     "LastKeyframe",
     "Map",
+    "MapObject",
     "Message",
     "NamedGraph",
     "Pose",
     "Question",
+    "RetiredObject",
     "Segments",
     "Tags",
     "all_kinds",
     "array",
+    "pack_objects",
 ]

@@ -12,10 +12,26 @@ from placegraph.runtime.arrays import F32, F64, I32, I64, U8, U16, Bool
 from placegraph.runtime.messages.declaration import ArraySpec as ArraySpec
 from placegraph.runtime.messages.declaration import Message as Message
 from placegraph.runtime.messages.declaration import array as array
+from placegraph.runtime.messages.map_objects import MapObject as MapObject
+from placegraph.runtime.messages.map_objects import RetiredObject as RetiredObject
+from placegraph.runtime.messages.map_objects import pack_objects as pack_objects
+from placegraph.runtime.messages.map_objects import unpack_tags
+
+
+class DepthImage:
+    """What messages with a depth image share."""
+
+    depth: U16
+    depth_unit_m: float
+
+    @property
+    def depth_m(self) -> F32:
+        """The depth image in metres, (H, W); 0 = no reading."""
+        return self.depth.astype(np.float32) * np.float32(self.depth_unit_m)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Frame(Message):
+class Frame(Message, DepthImage):
     """One colour and depth image of the camera, aligned to each other."""
 
     color: U8 = array("uint8", ("H", "W", 3), unit="sRGB")
@@ -46,8 +62,8 @@ class Pose(Message):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Keyframe(Message):
-    """A frame worth perceiving, with its pose."""
+class Keyframe(Message, DepthImage):
+    """A frame that is perceived, with its pose."""
 
     @classmethod
     def of(cls, frame: Frame, world_from_camera: F64) -> Keyframe:
@@ -152,6 +168,38 @@ class Map(Message):
     retired_tag_names: tuple[str, ...]  # as tag_names
     retired_tag_votes: F32 = array("float32", ("U",), unit="1")
     retired_tag_offsets: I64 = array("int64", ("R+1",), unit="1")
+
+    def objects(self) -> list[MapObject]:
+        """The objects, by id; arrays are views."""
+        tags = unpack_tags(self.tag_names, self.tag_votes, self.tag_offsets)
+        return [
+            MapObject(
+                id=int(self.object_ids[i]),
+                box=self.object_boxes_world[i],
+                oriented_box=self.object_oriented_boxes[i],
+                color=self.object_colors[i],
+                observations=int(self.object_observations[i]),
+                first_frame=int(self.object_first_frames[i]),
+                last_frame=int(self.object_last_frames[i]),
+                points=self.object_points_world[self.object_point_offsets[i] : self.object_point_offsets[i + 1]],
+                tags=tags[i],
+            )
+            for i in range(len(self.object_ids))
+        ]
+
+    def retired(self) -> list[RetiredObject]:
+        """The objects that are no longer where they were, by id; arrays are views."""
+        tags = unpack_tags(self.retired_tag_names, self.retired_tag_votes, self.retired_tag_offsets)
+        return [
+            RetiredObject(
+                id=int(self.retired_ids[i]),
+                box=self.retired_boxes_world[i],
+                last_frame=int(self.retired_last_frames[i]),
+                gone_frame=int(self.retired_gone_frames[i]),
+                tags=tags[i],
+            )
+            for i in range(len(self.retired_ids))
+        ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

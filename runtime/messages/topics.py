@@ -33,11 +33,11 @@ class Topic:
 TOPICS: dict[type[m.Message], Topic] = {
     topic.kind: topic
     for topic in (
-        Topic(
-            m.Frame, "frame", credit=8, keep_newest=8, rate_hz=10.0, recorded=False
-        ),  # `placegraph record` writes these
+        # frames are recorded by `placegraph record` only
+        Topic(m.Frame, "frame", credit=8, keep_newest=8, rate_hz=10.0, recorded=False),
         Topic(m.End, "end", credit=8, keep_newest=0, rate_hz=0.0, recorded=True),
-        Topic(m.Pose, "pose", credit=64, keep_newest=0, rate_hz=10.0, recorded=True),
+        # live, odometry must never wait for a blocked `keyframe`: 4096 poses are 2 MB and two minutes at 30 Hz
+        Topic(m.Pose, "pose", credit=64, keep_newest=4096, rate_hz=10.0, recorded=True),
         Topic(m.Keyframe, "keyframe", credit=6, keep_newest=0, rate_hz=1.0, recorded=True),
         Topic(m.Correction, "correction", credit=6, keep_newest=0, rate_hz=0.0, recorded=True),
         Topic(m.LastKeyframe, "last_keyframe", credit=6, keep_newest=0, rate_hz=0.0, recorded=True),

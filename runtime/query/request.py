@@ -12,13 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
+from placegraph.runtime.validation import MAX_COORDINATE_M
 
 MAX_BYTES = 65_536  # of a request; more is refused unread
 # all chosen by hand
 MAX_TEXT = 500  # characters; longer is not a question but a document
 MAX_ID = 100  # characters
 MAX_CANDIDATES = 50
-MAX_COORDINATE_M = 1e6  # no building is larger, and no sum of squares overflows
 # parsed by the language model, by phrase rules, or asked of the model level by level
 Mode = Literal["program", "rules", "deductive"]
 MODES: tuple[str, ...] = get_args(Mode)
@@ -49,25 +49,29 @@ REQUEST_FIELDS = tuple(QuestionRequest.model_fields)
 
 def parse_request(payload: bytes, fallback_id: str = "") -> Question:
     """Read a request; raises QueryError naming what is wrong. `fallback_id`: for a request without an id."""
+    return to_question({"id": fallback_id} | parse_json_object(payload, '{"text": "..."}'))
+
+
+def parse_json_object(payload: bytes, example: str) -> dict[str, Any]:
+    """The JSON object in at most MAX_BYTES of UTF-8; raises QueryError, which shows the example."""
     if len(payload) > MAX_BYTES:
-        raise QueryError(f"the request has {len(payload)} bytes; at most {MAX_BYTES} are read")
+        raise QueryError(f"has {len(payload)} bytes; at most {MAX_BYTES} are read")
     try:
-        request = json.loads(payload.decode("utf-8"))
+        fields = json.loads(payload.decode("utf-8-sig"))  # -sig: some editors write a byte order mark first
     except UnicodeDecodeError:
-        raise QueryError("the request is not UTF-8") from None
+        raise QueryError("not UTF-8") from None
     except (ValueError, RecursionError):  # ValueError: also a number of thousands of digits
-        raise QueryError('the request is not JSON; expected {"text": "..."}') from None
-    if not isinstance(request, dict):
-        raise QueryError(f'expected an object like {{"text": "..."}}, got {type(request).__name__}')
-    return to_question({"id": fallback_id} | request)
+        raise QueryError(f"not JSON; expected {example}") from None
+    if not isinstance(fields, dict):
+        raise QueryError(f"expected an object like {example}, got {type(fields).__name__}")
+    return fields
 
 
 def request_id(payload: bytes) -> str:
     """The id in a request whose other fields may be wrong; "" when there is none that could be sent back."""
     try:
-        request = json.loads(payload) if len(payload) <= MAX_BYTES else None
-        return QuestionRequest(text="-", id=request["id"]).id if isinstance(request, dict) and "id" in request else ""
-    except (ValueError, RecursionError):  # ValueError: not JSON, not UTF-8, or an id that breaks its rule
+        return QuestionRequest(text="-", id=parse_json_object(payload, "").get("id", "")).id
+    except (QueryError, ValidationError):
         return ""
 
 

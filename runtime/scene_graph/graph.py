@@ -11,71 +11,77 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    WithJsonSchema,
+    model_serializer,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.scene_graph.json_types import Box, Numbers, Outline, Tag
+from placegraph.runtime.scene_graph.node_ids import LAYERS, PARENT_LAYERS, NodeId, id_key
 from placegraph.runtime.scene_graph.place_graph import (
     Approach,
     Connection,
     RouteSegment,
-    approach_from_dict,
-    approach_to_dict,
     check_approach,
     check_connection,
     check_route_segment,
-    connection_from_dict,
     connection_key,
-    connection_to_dict,
-    rounded,
-    route_segment_from_dict,
-    route_segment_to_dict,
 )
+from placegraph.runtime.validation import first_error
 
 VERSION = 2  # 2: connections, ways and approaches
-LAYERS = {"B": "building", "F": "floor", "R": "room", "L": "location", "O": "object"}
-PARENT_LAYERS = {
-    "building": (),
-    "floor": ("building",),
-    "room": ("floor",),
-    "location": ("room",),
-    "object": ("room", "location"),
-}
-ID_PATTERN = re.compile(r"[BFRLO](0|[1-9][0-9]*)")
-
-
-@dataclass(frozen=True)
-class Tag:
-    """One name of a node and the weight of the evidence for it (summed votes for objects, probability for places)."""
-
-    name: str
-    weight: float
+OBJECT_FIELDS = ("observations", "oriented_box", "color", "approach", "front")  # only objects have them in JSON
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Node:
     """One building, floor, room, location or object. Box (2, 3) min/max and footprint (K, 2) in metres, world frame."""
 
-    id: str
+    id: NodeId
     parent: str  # "" for the building
     tags: tuple[Tag, ...]  # strongest first
-    box: F64
-    footprint: F64
+    box: Box
+    footprint: Outline
     first_frame: int  # -1: not tied to frames
     last_frame: int
     observations: int = 0
-    oriented_box: tuple[float, ...] = ()  # objects: centre x y z, size x y z, yaw in rad about z
+    oriented_box: Numbers = ()  # objects: centre x y z, size x y z, yaw in rad about z
     color: tuple[int, ...] = ()  # objects: sRGB median
     approach: Approach | None = None  # objects: where to stand to face it; None when there is no such place
-    front: tuple[float, ...] = ()  # imported objects: direction (x, y) of their front; () when unknown
+    front: Numbers = ()  # imported objects: direction (x, y) of their front; () when unknown
+
+    @model_serializer(mode="wrap")
+    def _write(self, write_fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        entry: dict[str, Any] = write_fields(self) | {"layer": self.layer}
+        if self.layer != "object":
+            return {name: value for name, value in entry.items() if name not in OBJECT_FIELDS}
+        if not self.front:
+            del entry["front"]
+        return entry
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        json_schema = handler.resolve_ref_schema(handler(schema))
+        json_schema["properties"]["layer"] = {"enum": list(PARENT_LAYERS), "description": "follows from the id"}
+        return json_schema
 
     @property
     def layer(self) -> str:
@@ -206,32 +212,30 @@ class SceneGraph:
 
     def to_json(self) -> str:
         """Canonical JSON: sorted keys, lengths to 1 mm, weights to 4 decimals; equal graphs give equal bytes."""
-        document = {
-            "version": VERSION,
-            "nodes": [_node_to_dict(node) for node in self.nodes.values()],
-            "connections": [connection_to_dict(connection) for connection in self.connections.values()],
-            "ways": [route_segment_to_dict(segment) for segment in self.route_segments],
-        }
-        return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+        document = _GraphDocument.model_construct(
+            version=VERSION,
+            nodes=list(self.nodes.values()),
+            connections=list(self.connections.values()),
+            ways=list(self.route_segments),
+        )
+        return json.dumps(document.model_dump(), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
     @classmethod
-    def from_json(cls, text: str, where: str = "scene graph") -> SceneGraph:
-        """Read and check; raises SchemaError naming `where` and what is wrong."""
+    def from_json(cls, text: str, where: str = "") -> SceneGraph:
+        """Read and check; raises SchemaError naming `where`, the node and the field that is wrong."""
+        prefix = f"{where}: " if where else ""
         try:
-            data = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise SchemaError(f"{where}: not JSON: {error}") from None
-        if not isinstance(data, dict) or data.get("version") != VERSION:
-            found = data.get("version") if isinstance(data, dict) else type(data).__name__
-            raise SchemaError(f"{where}: expected graph version {VERSION}, found {found}")
-        for name in ("nodes", "connections", "ways"):
-            if not isinstance(data.get(name), list):
-                raise SchemaError(f"{where}: '{name}' must be a list")
-        return cls.of(
-            (_node_from_dict(entry, f"{where}: nodes[{i}]") for i, entry in enumerate(data["nodes"])),
-            [connection_from_dict(entry, f"{where}: connections[{i}]") for i, entry in enumerate(data["connections"])],
-            [route_segment_from_dict(entry, f"{where}: ways[{i}]") for i, entry in enumerate(data["ways"])],
-        )
+            document = _GraphDocument.model_validate_json(text)
+            return cls.of(document.nodes, document.connections, document.ways)
+        except ValidationError as error:
+            raise SchemaError(f"{prefix}{first_error(error)}") from None
+        except SchemaError as error:
+            raise SchemaError(f"{prefix}{error}") from None
+
+    @staticmethod
+    def json_schema() -> dict[str, Any]:
+        """The JSON Schema of the canonical JSON."""
+        return _GraphDocument.model_json_schema()
 
     def save(self, path: Path) -> None:
         """Write canonical JSON to a file."""
@@ -246,53 +250,18 @@ class SceneGraph:
             raise SchemaError(f"{path}: cannot read the graph: {error}") from None
 
 
-def id_key(node_id: str) -> tuple[int, int]:
-    """Sort key: layer order from the building down, then number. Raises SchemaError for what is no id."""
-    if not isinstance(node_id, str) or not ID_PATTERN.fullmatch(node_id):
-        raise SchemaError(f"scene graph: {node_id!r} is not an id (a letter of B F R L O and a number)")
-    return list(LAYERS).index(node_id[0]), int(node_id[1:])
+def _check_version(version: Any) -> int:
+    if version != VERSION:
+        raise ValueError(f"expected graph version {VERSION}, found {version}")
+    return VERSION
 
 
-def _node_to_dict(node: Node) -> dict[str, Any]:
-    entry: dict[str, Any] = {
-        "id": node.id,
-        "layer": node.layer,
-        "parent": node.parent,
-        "tags": [[tag.name, rounded(tag.weight, 4)] for tag in node.tags],
-        "box": rounded(node.box, 3),
-        "footprint": rounded(node.footprint, 3),
-        "first_frame": node.first_frame,
-        "last_frame": node.last_frame,
-    }
-    if node.layer == "object":
-        entry |= {
-            "observations": node.observations,
-            "oriented_box": rounded(node.oriented_box, 3),
-            "color": list(node.color),
-            "approach": approach_to_dict(node.approach),
-        }
-        if node.front:
-            entry["front"] = rounded(node.front, 3)
-    return entry
+class _GraphDocument(BaseModel):
+    """The scene graph as it stands in graph.json; metres and radians, world frame."""
 
+    model_config = ConfigDict(title="SceneGraph")
 
-def _node_from_dict(entry: Any, where: str) -> Node:
-    try:
-        node_id = entry["id"]
-        id_key(node_id)
-        return Node(
-            id=node_id,
-            parent=str(entry["parent"]),
-            tags=tuple(Tag(str(name), float(weight)) for name, weight in entry["tags"]),
-            box=np.array(entry["box"], float).reshape(2, 3),
-            footprint=np.array(entry["footprint"], float).reshape(-1, 2),
-            first_frame=int(entry["first_frame"]),
-            last_frame=int(entry["last_frame"]),
-            observations=int(entry.get("observations", 0)),
-            oriented_box=tuple(float(v) for v in entry.get("oriented_box", ())),
-            color=tuple(int(v) for v in entry.get("color", ())),
-            approach=approach_from_dict(entry.get("approach")),
-            front=tuple(float(v) for v in entry.get("front", ())),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise SchemaError(f"{where}: {type(error).__name__}: {error}") from None
+    version: Annotated[int, PlainValidator(_check_version), WithJsonSchema({"const": VERSION})]
+    nodes: list[Node]
+    connections: list[Connection]
+    ways: list[RouteSegment]

@@ -25,13 +25,13 @@ from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, mod
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Tag
+from placegraph.runtime.validation import MAX_COORDINATE_M, first_error, is_unicode
 
 logger = logging.getLogger(__name__)
 
 SourceId = str | int  # an id in the list
 
 # all chosen by hand
-MAX_M = 1e6  # no building is larger, and no sum of squares overflows
 MAX_TEXT = 200  # characters of an id or a name
 SECONDARY_NAME_WEIGHT = 0.5  # of the names after the first, where the list has no weights
 
@@ -39,7 +39,7 @@ SECONDARY_NAME_WEIGHT = 0.5  # of the names after the first, where the list has 
 def _text(value: object, what: str) -> str:
     if not isinstance(value, str) or not value.strip() or len(value) > MAX_TEXT:
         raise ValueError(f"expected {what}: text that is not empty, at most {MAX_TEXT} characters")
-    if any("\ud800" <= character <= "\udfff" for character in value):  # JSON can spell them, UTF-8 cannot
+    if not is_unicode(value):
         raise ValueError(f"expected {what}; half of a surrogate pair is no character")
     return value
 
@@ -48,7 +48,9 @@ def _id(value: object) -> SourceId:
     return value if type(value) is int else _text(value, "an id, text or a whole number")
 
 
-def _numbers(value: object, counts: Sequence[int], what: str, low: float = -MAX_M, high: float = MAX_M) -> list[float]:
+def _numbers(
+    value: object, counts: Sequence[int], what: str, low: float = -MAX_COORDINATE_M, high: float = MAX_COORDINATE_M
+) -> list[float]:
     numbers = value if isinstance(value, list) else []
     if len(numbers) not in counts or not all(type(v) in (int, float) and low <= v <= high for v in numbers):
         raise ValueError(f"expected {what}, each from {low:g} to {high:g}, got {reprlib.repr(value)}")
@@ -189,10 +191,7 @@ def parse_object_list(data: object, where: str) -> ObjectList:
     try:
         listed = ObjectList.model_validate(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        at = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
-        reason = first["msg"].removeprefix("Value error, ")
-        raise SchemaError(": ".join(part for part in (where, at, reason) if part)) from None
+        raise SchemaError(f"{where}: {first_error(error)}") from None
     for layer in ("objects", "rooms", "floors"):
         seen: dict[SourceId, int] = {}
         for i, entry in enumerate(getattr(listed, layer) or ()):

@@ -11,6 +11,7 @@ import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -115,29 +116,12 @@ def _boxes(centers: Sequence[Sequence[float]], sizes: Sequence[Sequence[float]])
 
 
 def _node(
-    node_id: str,
-    parent: str,
-    tags: tuple[Tag, ...],
-    box: F64,
-    *,
-    outline: F64 | None = None,
-    color: tuple[int, ...] = (),
-    front: tuple[float, ...] = (),
+    node_id: str, parent: str, tags: tuple[Tag, ...], box: F64, outline: F64 | None = None, **fields: Any
 ) -> Node:
-    if outline is None:
-        (x0, y0, _), (x1, y1, _) = box.tolist()
-        outline = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-    return Node(
-        id=node_id,
-        parent=parent,
-        tags=tags,
-        box=box,
-        footprint=outline,
-        first_frame=-1,
-        last_frame=-1,
-        color=color,
-        front=front,
-    )
+    (x0, y0, _), (x1, y1, _) = box.tolist()
+    footprint = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) if outline is None else outline
+    fields |= {"first_frame": -1, "last_frame": -1}
+    return Node(id=node_id, parent=parent, tags=tags, box=box, footprint=footprint, **fields)
 
 
 def _places(listed: ObjectList, boxes: F64) -> tuple[list[_PlaceDraft], list[_PlaceDraft], list[int]]:

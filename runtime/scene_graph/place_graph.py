@@ -11,12 +11,14 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from pydantic import WithJsonSchema
 
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
+from placegraph.runtime.scene_graph.json_types import Box, LengthsById, Metres, Outline, Position, Radians
 
 KINDS = ("door", "opening", "stairs")
 CONNECTION_ID = re.compile(r"C(0|[1-9][0-9]*)")
@@ -28,11 +30,11 @@ class Connection:
     """A passage between two rooms; its ends are in rooms[0] and rooms[1], of stairs the lower one first."""
 
     id: str
-    kind: str  # one of KINDS
+    kind: Annotated[str, WithJsonSchema({"enum": list(KINDS)})]
     rooms: tuple[str, str]
-    ends: F64  # (2, 3); of a door and an opening both are its middle
-    width_m: float
-    length_m: float  # of the path between the ends: 0 for a door
+    ends: Box  # (2, 3) metres; of a door and an opening both are its middle
+    width_m: Metres
+    length_m: Metres  # of the path between the ends: 0 for a door
 
     def end_in(self, room: str) -> F64:
         """(3,) the end that is in one of its rooms."""
@@ -49,17 +51,17 @@ class RouteSegment:
 
     room: str
     ends: tuple[str, str]
-    length_m: float
-    points: F64  # (K, 2), K >= 2, from the first end to the second
+    length_m: Metres
+    points: Outline  # (K, 2) metres, K >= 2, from the first end to the second
 
 
 @dataclass(frozen=True)
 class Approach:
     """Where a robot can stand to face an object, and the travel distances from its room's connections and middle."""
 
-    position: tuple[float, float, float]  # of the robot's middle on the floor
-    yaw_rad: float  # about z, 0 along x
-    travel_m: tuple[tuple[str, float], ...]  # (id as in RouteSegment.ends, metres); empty when it cannot be reached
+    position: Position  # of the robot's middle on the floor
+    yaw_rad: Radians  # about z, 0 along x
+    travel_m: LengthsById  # (id as in RouteSegment.ends, metres); empty when it cannot be reached
 
 
 def connection_key(connection_id: str) -> int:
@@ -124,84 +126,3 @@ def _check_end(where: str, end: str, room: str, connections: Mapping[str, Connec
 def _check_length(where: str, length_m: float, straight_m: float) -> None:
     if not math.isfinite(length_m) or length_m < straight_m - ROUNDING_M:
         raise SchemaError(f"{where}: length {length_m} m is not at least the straight line, {straight_m:.3f} m")
-
-
-def rounded(values: Any, digits: int) -> Any:
-    """Numbers as the canonical JSON has them."""
-    # adding 0.0 turns -0.0 into 0.0, so that equal graphs print alike
-    return (np.round(np.asarray(values, float), digits) + 0.0).tolist()
-
-
-def connection_to_dict(connection: Connection) -> dict[str, Any]:
-    """A connection's entry in the canonical JSON."""
-    return {
-        "id": connection.id,
-        "kind": connection.kind,
-        "rooms": list(connection.rooms),
-        "ends": rounded(connection.ends, 3),
-        "width_m": rounded(connection.width_m, 3),
-        "length_m": rounded(connection.length_m, 3),
-    }
-
-
-def connection_from_dict(entry: Any, where: str) -> Connection:
-    """Read what connection_to_dict made; raises SchemaError."""
-    try:
-        return Connection(
-            id=str(entry["id"]),
-            kind=str(entry["kind"]),
-            rooms=_pair(entry["rooms"]),
-            ends=np.array(entry["ends"], float).reshape(2, 3),
-            width_m=float(entry["width_m"]),
-            length_m=float(entry["length_m"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise SchemaError(f"{where}: {type(error).__name__}: {error}") from None
-
-
-def route_segment_to_dict(segment: RouteSegment) -> dict[str, Any]:
-    """A way's entry in the canonical JSON."""
-    return {
-        "room": segment.room,
-        "ends": list(segment.ends),
-        "length_m": rounded(segment.length_m, 3),
-        "points": rounded(segment.points, 3),
-    }
-
-
-def route_segment_from_dict(entry: Any, where: str) -> RouteSegment:
-    """Read what way_to_dict made; raises SchemaError."""
-    try:
-        return RouteSegment(
-            room=str(entry["room"]),
-            ends=_pair(entry["ends"]),
-            length_m=float(entry["length_m"]),
-            points=np.array(entry["points"], float).reshape(-1, 2),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise SchemaError(f"{where}: {type(error).__name__}: {error}") from None
-
-
-def approach_to_dict(approach: Approach | None) -> dict[str, Any] | None:
-    """An object's approach in the canonical JSON; null for none."""
-    if approach is None:
-        return None
-    return {
-        "position": rounded(approach.position, 3),
-        "yaw_rad": rounded(approach.yaw_rad, 3),
-        "travel_m": {end: rounded(length, 3) for end, length in approach.travel_m},
-    }
-
-
-def approach_from_dict(entry: Any) -> Approach | None:
-    """Read what approach_to_dict made; raises KeyError, TypeError, ValueError for what it did not make."""
-    if entry is None:
-        return None
-    x, y, z = (float(value) for value in entry["position"])
-    travel = tuple((str(end), float(length)) for end, length in sorted(entry["travel_m"].items()))
-    return Approach((x, y, z), float(entry["yaw_rad"]), travel)
-
-
-def _pair(values: Any) -> tuple[str, str]:
-    first, second = values
-    return str(first), str(second)

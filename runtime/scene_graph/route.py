@@ -10,6 +10,7 @@ from __future__ import annotations
 import heapq
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from placegraph.runtime.arrays import F64
@@ -153,14 +154,7 @@ def _segment_points(graph: SceneGraph, room: str, start: str, end: str) -> F64:
 
 
 def _distance_to(footprint: F64, xy: F64) -> float:
-    """Metres from a point to a polygon (N, 2); 0 inside."""
-    if len(footprint) < 3:
-        return float(np.linalg.norm(footprint - xy, axis=1).min(initial=np.inf))
-    a, b = footprint, np.roll(footprint, -1, axis=0)
-    along = b - a
-    share = np.clip(((xy - a) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12), 0, 1)
-    nearest = float(np.linalg.norm(a + share[:, None] * along - xy, axis=1).min())
-    above = (a[:, 1] > xy[1]) != (b[:, 1] > xy[1])
-    rise = np.where(along[:, 1] == 0, 1.0, along[:, 1])
-    crossed = above & (xy[0] < a[:, 0] + (xy[1] - a[:, 1]) / rise * along[:, 0])
-    return 0.0 if crossed.sum() % 2 else nearest
+    """Metres from a point to a polygon (N, 2); 0 inside, infinite without a polygon."""
+    if not len(footprint):
+        return np.inf
+    return max(0.0, -cv2.pointPolygonTest(footprint.astype(np.float32), xy.tolist(), True))

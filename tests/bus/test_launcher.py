@@ -25,7 +25,7 @@ def flow(bus_config: BusConfig, folder: Path, limit: int = FRAMES, **camera: obj
     nodes = {
         "camera": {"source": "flat", "limit": limit, "settings": {"width": 160, "height": 120}, **camera},
         "pose": {"stride": 2},
-        "keyframe": {"translation_m": 0.02, "lost_after_s": 2.0},
+        "keyframe": {"translation_m": 0.02},
         "instances": {"model": "drawn_scene"},
     }
     config = RunConfig(run=RunSettings(), bus=bus_config, nodes=nodes)

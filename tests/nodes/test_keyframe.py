@@ -1,10 +1,9 @@
 import itertools
 
 import numpy as np
-import pytest
 
 from placegraph.nodes.keyframe import KeyframeConfig, KeyframeNode
-from placegraph.runtime.messages import End, Frame, Keyframe, LastKeyframe, Message, Pose, Segments
+from placegraph.runtime.messages import End, Frame, Keyframe, LastKeyframe, Message, Pose
 from placegraph.runtime.node import Context
 
 
@@ -29,14 +28,6 @@ def pose(i: int, x: float, trusted: bool = True, yaw: float = 0.0) -> Pose:
     return Pose(frame_id=i, stamp_ns=i * 33_000_000, world_from_camera=world_from_camera, trusted=trusted, **measured)
 
 
-def segments(i: int) -> Segments:
-    none = np.zeros(0, np.float32)
-    boxes, bits = np.zeros((0, 4), np.int32), np.zeros(0, np.uint8)
-    offsets = np.zeros(1, np.int64)
-    fields = {"names": (), "scores": none, "boxes_px": boxes, "mask_bits": bits, "mask_offsets": offsets}
-    return Segments(frame_id=i, stamp_ns=0, **fields)
-
-
 def end(i: int) -> End:
     return End(frame_id=i, stamp_ns=0, frames=i + 1)
 
@@ -55,13 +46,20 @@ def test_no_frames_at_all() -> None:
 
 
 def test_live_frames_are_bounded_while_no_pose_comes() -> None:
-    gate = node(lossless=False, lost_after_s=1.0)
+    gate = node(lossless=False, pose_timeout_s=1.0)
     assert chosen(gate, [frame(i) for i in range(200)]) == []
     assert len(gate._synchronizer) <= 1 + 1000 / 33
-    assert chosen(gate, [pose(i, 0.2 * i) for i in range(200)]) == [169, 170, 171, 172]  # then four are in flight
-    replay = node(lost_after_s=1.0)
+    assert chosen(gate, [pose(i, 0.2 * i) for i in range(200)]) == list(range(169, 200))
+    replay = node(pose_timeout_s=1.0)
     assert chosen(replay, [frame(i) for i in range(200)]) == []
-    assert len(replay._synchronizer) == 200  # bounded by the windows of the bus
+    assert len(replay._synchronizer) == 200  # bounded by the credit of the bus
+
+
+def test_live_poses_of_frames_that_were_dropped_are_forgotten_and_the_newest_frames_are_used() -> None:
+    gate = node(lossless=False, pose_timeout_s=1.0)
+    assert chosen(gate, [pose(i, 0.2 * i) for i in range(500)]) == []  # what comes while publishing a keyframe blocks
+    assert chosen(gate, [frame(i) for i in range(492, 500)]) == list(range(492, 500))
+    assert len(gate._synchronizer) == 0
 
 
 def test_only_untrusted_poses() -> None:
@@ -96,19 +94,3 @@ def test_choice_does_not_depend_on_how_frames_poses_and_end_interleave() -> None
         given = [type(out).__name__ for m in [*messages[:-1], end(2), messages[-1]] for out in gate.step(m)]
         results.add(tuple(given))
     assert results == {("Keyframe", "Keyframe", "Keyframe", "LastKeyframe")}
-
-
-@pytest.mark.parametrize("lossless", [True, False])
-def test_in_flight_bounds_live_only(lossless: bool) -> None:
-    gate = node(lossless, in_flight=2)
-    messages: list[Message] = [m for i in range(4) for m in (frame(i), pose(i, i))]
-    assert chosen(gate, messages) == ([0, 1, 2, 3] if lossless else [0, 1])
-    # a receipt of frame 1 stands for frame 0 too, whose own was lost
-    assert chosen(gate, [segments(1), frame(4), pose(4, 9.0), frame(5), pose(5, 10.0)]) == [4, 5]
-    assert chosen(gate, [frame(6), pose(6, 11.0)]) == ([6] if lossless else [])
-
-
-def test_live_keyframes_that_died_with_their_process_are_given_up() -> None:
-    gate = node(lossless=False, in_flight=1, lost_after_s=1.0)
-    messages: list[Message] = [m for i in range(40) for m in (frame(i), pose(i, float(i)))]
-    assert chosen(gate, messages) == [0, 31]  # 31 frames at 33 ms: the first later than a second

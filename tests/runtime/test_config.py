@@ -20,9 +20,9 @@ def written(folder: Path, text: str) -> Path:
     [
         ("", r"\[nodes\]: Field required"),
         ("[nodes", "flow.toml: "),
-        ("[run]\nthreds = 2\n[nodes.camera]", r"\[run\] threds: Extra inputs are not permitted"),
+        ("[run]\nthreds = 2\n[nodes.camera]", r"\[run\] threds: unknown key, did you mean threads\?"),
         ('[bus]\nmulticast = "yes"\n[nodes.camera]', r"\[bus\] multicast: Input should be a valid boolean"),
-        ("[extra]\n[nodes.camera]", r"\[extra\]: Extra inputs"),
+        ("[extra]\n[nodes.camera]", r"\[extra\]: unknown key; there are: bus, nodes, run"),
         ('[run]\nlog_level = "LOUD"\n[nodes.camera]', r"\[run\] log_level: Input should be 'DEBUG', 'INFO'"),
         ("[run]\nthreads = 0\n[nodes.camera]", r"\[run\] threads: Input should be greater than or equal to 1"),
         ('[run]\nout_dir = ""\n[nodes.camera]', r"\[run\] out_dir: String should have at least 1 character"),
@@ -50,7 +50,9 @@ def test_absent_file_lists_those_that_come_with_placegraph(tmp_path: Path) -> No
     [
         ("[nodes.pose]", "expected one source .*, found none"),
         (CAMERA + "[nodes.pos]", "no node named 'pos'; there are: .*pose"),
-        (CAMERA + "[nodes.pose]\ngian = 1", r"\[nodes.pose\] gian: Extra inputs are not permitted"),
+        (CAMERA + "[nodes.pose]\nstirde = 1", r"\[nodes.pose\] stirde: unknown key, did you mean stride\?"),
+        (CAMERA + "[nodes.pose.rgbd]\nmin_inlier = 1", r"rgbd.min_inlier: unknown key, did you mean min_inliers\?"),
+        (CAMERA + "[nodes.pose.rgbd.xyz]\nq = 1", r"\[nodes.pose\] rgbd.xyz: unknown key; there are: "),
         (CAMERA + '[nodes.pose]\nstride = "4"', r"\[nodes.pose\] stride: Input should be a valid integer"),
         (CAMERA + "[nodes.pose]\nvoxel_m = 0.0", r"\[nodes.pose\] voxel_m: Input should be greater than 0"),
         (
@@ -83,7 +85,7 @@ def test_order_waits_and_model_folders(tmp_path: Path) -> None:
     assert list(flow.nodes) == ["camera", "pose", "keyframe", "instances"]
     assert flow.context.lossless and flow.context.model_dirs == (str(tmp_path / "weights"),)
     assert flow.producer(Pose) == "pose" and flow.consumers(Frame) == ["pose", "keyframe"]
-    assert flow.consumers(Segments) == ["keyframe"] and flow.awaited_consumers("instances")["Segments"] == []
+    assert flow.consumers(Segments) == [] and flow.awaited_consumers("instances")["Segments"] == []
     assert flow.awaited_consumers("keyframe")["Keyframe"] == ["instances"] and flow.consumers(Keyframe) == ["instances"]
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.node import Context, build_node
-from placegraph.runtime.renamed_settings import RENAMED_SETTINGS
+from placegraph.runtime.renamed_settings import REMOVED_SETTINGS, RENAMED_SETTINGS
 from placegraph.tools.graph import node_types
 
 
@@ -25,5 +25,13 @@ def test_a_renamed_setting_is_refused_with_its_new_name_which_exists(old: str) -
         settings = settings[key]
 
 
-def test_the_list_is_in_order() -> None:
+@pytest.mark.parametrize("removed", REMOVED_SETTINGS)
+def test_a_removed_setting_is_refused_with_the_reason(removed: str) -> None:
+    node, *path = removed.split(".")
+    with pytest.raises(ConfigError, match=rf"\[nodes.{node}\] .*: this setting was removed, delete it: .* bus"):
+        build_node(node, nested(path, 1), Context())
+
+
+def test_the_lists_are_in_order() -> None:
     assert list(RENAMED_SETTINGS) == sorted(RENAMED_SETTINGS)
+    assert list(REMOVED_SETTINGS) == sorted(REMOVED_SETTINGS)

@@ -1,5 +1,7 @@
 import json
 import re
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,10 +16,10 @@ def test_the_tables_name_every_node_and_message(cli) -> None:
     nodes, topics = done.out.strip().split("\n\n")
     assert [line.split(" | ")[0].strip("| ") for line in nodes.splitlines()[2:]] == list(node_types())
     assert [line.split(" | ")[0].strip("| ") for line in topics.splitlines()[2:]] == [k.__name__ for k in TOPICS]
-    assert "| recorder | " in nodes and nodes.count("| nothing |") == 3  # two sources take and one sink gives nothing
+    assert "| recorder | " in nodes and nodes.count("| nothing |") == 3  # two sources and one sink
 
 
-def test_givers_come_before_takers() -> None:
+def test_producers_come_before_consumers() -> None:
     types = node_types()
     seen = {kind for node in types.values() if not node.inputs for kind in node.outputs}
     for node in types.values():
@@ -47,13 +49,62 @@ def test_json_is_the_file(cli, mapped) -> None:
     assert json.loads(text)["version"] == 2
 
 
+KINDS = {"object": dict, "array": list, "string": str, "integer": int, "number": (int, float), "null": type(None)}
+
+
+def problems(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str = "graph") -> list[str]:
+    """What a JSON value has against the part of JSON Schema that graph.json's uses; unknown fields count, too."""
+    if "$ref" in schema:
+        return problems(value, root["$defs"][schema["$ref"].rpartition("/")[2]], root, where)
+    if "anyOf" in schema:
+        options = [problems(value, option, root, where) for option in schema["anyOf"]]
+        return [] if [] in options else options[0]
+    if "const" in schema or "enum" in schema:
+        return [] if value in schema.get("enum", [schema.get("const")]) else [f"{where}: {value}"]
+    if not isinstance(value, KINDS[schema["type"]]):
+        return [f"{where}: {value} is no {schema['type']}"]
+    found = []
+    if isinstance(value, str):
+        found += [where] * (re.search(schema.get("pattern", ""), value) is None)
+    if isinstance(value, list):
+        found += [f"{where}: size"] * (not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", 1e9))
+        items = [*schema.get("prefixItems", []), *[schema.get("items", {})] * len(value)]
+        for i, item in enumerate(value):
+            found += problems(item, items[i], root, f"{where}[{i}]")
+    if isinstance(value, dict):
+        known, others = schema.get("properties", {}), schema.get("additionalProperties")
+        found += [f"{where}: no {name}" for name in schema.get("required", []) if name not in value]
+        for name, item in value.items():
+            field = known.get(name, others)
+            found += problems(item, field, root, f"{where}.{name}") if field else [f"{where}: unknown {name}"]
+    return found
+
+
+def reference_graph() -> dict[str, Any]:
+    """The last graph of the reference recording, from its summary."""
+    text = (Path(__file__).parents[1] / "replay" / "house.txt").read_text()
+    return json.JSONDecoder().raw_decode(text, text.index('{\n "connections"'))[0]
+
+
+def test_a_real_graph_fits_the_published_schema_and_a_wrong_one_does_not(cli) -> None:
+    schema = json.loads(cli("graph", "--schema").out)
+    document = reference_graph()
+    assert document["connections"] and document["ways"] and document["nodes"][-1]["approach"]
+    assert problems(document, schema, schema) == []
+    document["nodes"][-1]["box"].pop()
+    document["ways"][0]["points"][0][1] = "1"
+    del document["connections"][0]["kind"]
+    document["nodes"][0]["id"] = "X1"
+    assert len(problems(document, schema, schema)) == 4
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
         ("", "not JSON"),
-        ("[]", "expected graph version 2, found list"),
+        ("[]", "Input should be an object"),
         ('{"version": 99, "nodes": []}', "expected graph version 2, found 99"),
-        ('{"version": 2}', "'nodes' must be a list"),
+        ('{"version": 2}', "nodes: Field required"),
         ('{"version": 2, "nodes": [], "connections": [], "ways": []}', "building"),
         ('{"version": 2, "nodes": [{"id": "X1"}], "connections": [], "ways": []}', "is not an id"),
     ],

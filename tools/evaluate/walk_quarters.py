@@ -72,8 +72,7 @@ def _align_snapshot(
     ate = against_given(estimated, given)
     if ate is None:
         return EMPTY_MAP, {}
-    pieces = np.split(map_.object_points_world, map_.object_point_offsets[1:-1])
-    clouds = {f"O{number}": piece for number, piece in zip(map_.object_ids.tolist(), pieces, strict=False)}
+    clouds = {f"O{item.id}": item.points for item in map_.objects()}
     graph = SceneGraph.from_json(snapshot.graph.json)
     aligned_map = align_map(graph, clouds, level_alignment(*paired(estimated, given)), source)
     return aligned_map, {**ate, "ate_share": ratio(ate["ate_rmse_m"], ate["path_m"])}

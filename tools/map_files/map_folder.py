@@ -51,20 +51,16 @@ def retired_objects(map_: Map) -> list[dict[str, Any]]:
 
     `gone` is the frame at which enough keyframes had seen through the object's place.
     """
-    rows = []
-    for i, number in enumerate(map_.retired_ids.tolist()):
-        tags = slice(*map_.retired_tag_offsets[i : i + 2].tolist())
-        votes = zip(map_.retired_tag_names[tags], map_.retired_tag_votes[tags].tolist(), strict=True)
-        rows.append(
-            {
-                "id": f"O{number}",
-                "tags": [[name, round(vote, 3)] for name, vote in votes],
-                "box": np.round(map_.retired_boxes_world[i].astype(float), 3).tolist(),
-                "last_seen": int(map_.retired_last_frames[i]),
-                "gone": int(map_.retired_gone_frames[i]),
-            }
-        )
-    return rows
+    return [
+        {
+            "id": f"O{item.id}",
+            "tags": [[name, round(vote, 3)] for name, vote in item.tags],
+            "box": np.round(item.box.astype(float), 3).tolist(),
+            "last_seen": item.last_frame,
+            "gone": item.gone_frame,
+        }
+        for item in map_.retired()
+    ]
 
 
 def make_empty_folder(folder: Path) -> None:

@@ -16,8 +16,9 @@ from rich.progress import track
 
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError, SchemaError
 from placegraph.runtime.query.reply import error_reply
-from placegraph.runtime.query.request import MAX_BYTES, make_question
+from placegraph.runtime.query.request import make_question, parse_json_object
 from placegraph.runtime.scene_graph.object_list import SourceId
+from placegraph.runtime.validation import is_unicode
 from placegraph.tools.query.offline_query import OfflineQuery
 
 logger = logging.getLogger(__name__)
@@ -60,7 +61,7 @@ class LineAnswerer:
         """The answer to a line; an error names its number. Raises ModelError, ConfigError: they concern all lines."""
         question_id: SourceId | None = None
         try:
-            fields = _fields(line)
+            fields = parse_json_object(line, '{"id": "...", "text": "..."}')
             question_id = _id(fields)
             reply = self._ask(fields)
         except (QueryError, SchemaError) as error:
@@ -91,25 +92,11 @@ class LineAnswerer:
             raise QueryError(f"graph: {error.strerror}") from None
 
 
-def _fields(line: bytes) -> dict[str, Any]:
-    if len(line) > MAX_BYTES:
-        raise QueryError(f"{len(line)} bytes; at most {MAX_BYTES} are read")
-    try:
-        fields = json.loads(line.decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise QueryError("not UTF-8") from None
-    except (ValueError, RecursionError):
-        raise QueryError('not JSON; expected {"id": "...", "text": "..."}') from None
-    if not isinstance(fields, dict):
-        raise QueryError(f'expected an object like {{"id": "...", "text": "..."}}, got {type(fields).__name__}')
-    return fields
-
-
 def _id(fields: dict[str, Any]) -> SourceId:
     line_id = fields.get("id")
     if type(line_id) is int:
         return line_id
-    if not isinstance(line_id, str) or not line_id or any("\ud800" <= c <= "\udfff" for c in line_id):
+    if not isinstance(line_id, str) or not line_id or not is_unicode(line_id):
         raise QueryError("id: expected text that is not empty, or a whole number")
     return line_id
 

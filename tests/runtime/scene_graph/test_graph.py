@@ -78,15 +78,18 @@ def test_rounding_and_minus_zero() -> None:
     ("text", "problem"),
     [
         ("", "not JSON"),
-        ("[]", "expected graph version 2, found list"),
+        ("[]", "Input should be an object"),
         ('{"version": 1}', "expected graph version 2, found 1"),
         ('{"version": 3}', "expected graph version 2, found 3"),
-        ('{"version": 2}', "'nodes' must be a list"),
-        ('{"version": 2, "nodes": [3], "connections": [], "ways": []}', r"nodes\[0\]: TypeError"),
-        ('{"version": 2, "nodes": [{"id": "B0"}], "connections": [], "ways": []}', r"nodes\[0\]: KeyError: 'parent'"),
+        ('{"version": 2}', "nodes: Field required"),
+        ('{"version": 2, "nodes": [3], "connections": [], "ways": []}', r"nodes\[0\]: Input should be an object"),
+        (
+            '{"version": 2, "nodes": [{"id": "B0"}], "connections": [], "ways": []}',
+            r"nodes\[0\]\.parent: Field required",
+        ),
     ],
 )
-def test_bad_files(tmp_path: Path, text: str, problem: str) -> None:
+def test_bad_files_are_named_with_node_and_field(tmp_path: Path, text: str, problem: str) -> None:
     path = tmp_path / "graph.json"
     path.write_text(text)
     with pytest.raises(SchemaError, match=problem) as error:
