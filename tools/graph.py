@@ -20,7 +20,7 @@ def graph(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the graph's canonical JSON.")] = False,
 ) -> None:
-    """Print which node takes and gives which message; with MAP, its building, floors, rooms, locations, objects."""
+    """Print the dataflow as tables or, with MAP, the hierarchy of a map."""
     if map_folder is None:
         print(dataflow_table())
         print()

@@ -24,9 +24,10 @@ def path(
     goal: Annotated[str, typer.Argument(metavar="TO", help="The same.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print the shortest route between two places of a map: rooms, doors and stairs, metres, way points.
+    """Print the shortest route between two places of a map.
 
-    It starts and ends in the middle of a room, or in front of an object. Exit status 1: no route is known.
+    Rooms, doors and stairs on the way, metres, way points. A route starts and ends in the middle of a room or in front
+    of an object. Exit status 1: no route is known.
     """
     graph = SceneGraph.load(find_graph(map_folder))
     a, b = find_place(graph, start), find_place(graph, goal)

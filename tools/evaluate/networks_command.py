@@ -22,7 +22,7 @@ TIMED_VIEWS = 24  # after one that warms up
 THREADS = (1, 2)
 
 
-def networks(
+def evaluate_networks(
     houses: Annotated[int, typer.Option(min=1, help="Evaluation houses.")] = 20,
     views: Annotated[int, typer.Option(min=1, help="Views of each.")] = 24,
     tagger: Annotated[str, typer.Option(help="Weights of the tagger.")] = "house_tagger",

@@ -40,7 +40,10 @@ def export(
     kind: Annotated[Format, typer.Argument(metavar="dsg|svg|glb|ply|ros")],
     out: Annotated[Path, typer.Option(help="File to write; for ply and ros a folder.")],
 ) -> None:
-    """Write a map for others: spark_dsg (Hydra) JSON, SVG floor plans, a GLB scene, PLY points, ROS occupancy maps."""
+    """Write a map in a format of other systems.
+
+    dsg: JSON of spark_dsg (Hydra); svg: floor plans; glb: a 3D scene; ply: points of each node; ros: occupancy maps.
+    """
     graph = SceneGraph.load(find_graph(map_folder))
     try:
         for path in WRITERS[kind](map_folder, graph, out):

@@ -19,7 +19,7 @@ def references(
     update: Annotated[bool, typer.Option("--update", help="Make the recording and its summary again.")] = False,
     folder: Annotated[Path, typer.Option(help="Their folder; by default in this source checkout.")] = FOLDER,
 ) -> None:
-    """Compare what every node gives with the recorded reference, or make the reference again.
+    """Compare the outputs of every node with the reference recording, or make it again.
 
     Exit status: 0 as recorded, 1 something differs.
     """

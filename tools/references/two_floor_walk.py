@@ -91,4 +91,4 @@ def _paint(depth_m: F64, hit: I64, world_from_camera: F64) -> U8:
     cells = np.floor((points + 1e-4) / CELL_M).astype(np.int64)
     random = (cells @ np.array([73856093, 19349663, 83492791]) ^ hit * 2654435761) % 1009 / 1009
     hues = np.random.default_rng(0).uniform(0.5, 1.0, (hit.max() + 2, 3))
-    return np.rint((50 + 200 * random[..., None]) * hues[hit]).astype(np.uint8)
+    return np.asarray(np.rint((50 + 200 * random[..., None]) * hues[hit]), np.uint8)

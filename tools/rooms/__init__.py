@@ -59,7 +59,10 @@ def rooms(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON with the outlines in metres.")] = False,
 ) -> None:
-    """Split an occupancy map (PNG, PGM, ROS's YAML), or a point cloud's floors (PLY), into rooms as label images."""
+    """Split an occupancy map or a point cloud of another system into rooms.
+
+    Reads a map as PNG, PGM or ROS's YAML and a cloud as PLY; writes a label image for each floor.
+    """
     if source.suffix.lower() == ".ply":
         floors = [_floor_row(*floor) for floor in _write_floors(source, out, resolution)]
         print(json.dumps({"floors": floors}, sort_keys=True) if as_json else "\n".join(map(_floor_text, floors)))

@@ -193,7 +193,7 @@ def track(tmp_path, seven):
 
 
 def test_the_command_on_a_moved_copy(cli, track, seven) -> None:
-    done = cli("evaluate", track(), "--source", seven, "--json")
+    done = cli("evaluate", "map", track(), "--source", seven, "--json")
     assert done.code == 0 and done.err == ""
     found = json.loads(done.out)
     assert set(found) == {"ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg", "poses_given"}
@@ -201,22 +201,23 @@ def test_the_command_on_a_moved_copy(cli, track, seven) -> None:
 
 
 def test_the_command_in_words(cli, track, seven) -> None:
-    done = cli("evaluate", track(0.3), "--source", seven)
+    done = cli("evaluate", "map", track(0.3), "--source", seven)
     assert done.out.startswith("ATE rmse 0.") and " m of path: " in done.out and "rmse 0.0 m" not in done.out
 
 
 def test_errors_name_the_file(cli, track, seven, tmp_path) -> None:
     folder = track()
-    absent = cli("evaluate", tmp_path / "no", "--source", seven)
+    absent = cli("evaluate", "map", tmp_path / "no", "--source", seven)
     assert (absent.code, absent.reason) == (
         1,
         f"{tmp_path / 'no' / 'trajectory.txt'}: cannot read: No such file or directory",
     )
-    source = cli("evaluate", folder, "--source", tmp_path / "no")
+    source = cli("evaluate", "map", folder, "--source", tmp_path / "no")
     assert (source.code, source.reason) == (1, f"{tmp_path / 'no'}: no such file or folder")
     (folder / "trajectory.txt").write_text("# nothing\n")
-    assert "fewer than 3 given poses at the times of" in cli("evaluate", folder, "--source", seven).reason
+    assert "fewer than 3 given poses at the times of" in cli("evaluate", "map", folder, "--source", seven).reason
     (folder / "trajectory.txt").write_text("# two\n0.0 1 2 3\n")
     assert (
-        cli("evaluate", folder, "--source", seven).reason == f"{folder / 'trajectory.txt'}:2: expected 8 finite numbers"
+        cli("evaluate", "map", folder, "--source", seven).reason
+        == f"{folder / 'trajectory.txt'}:2: expected 8 finite numbers"
     )
