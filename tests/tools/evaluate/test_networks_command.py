@@ -21,7 +21,7 @@ from placegraph.tools.evaluate.network_scores import (
     network_scores,
     tag_scores,
 )
-from placegraph.tools.evaluate.networks_command import network_times
+from placegraph.tools.evaluate.networks_command import evaluate_networks, network_times
 from placegraph.tools.simulator.classes import CLASSES, NAMES
 from placegraph.tools.training.samples import MIN_SHARE
 from placegraph.tools.training.views import EVALUATION_SEEDS, visible_boxes
