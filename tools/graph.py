@@ -11,7 +11,7 @@ from placegraph.runtime.messages import Message
 from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import NODES, Node, available, plugin
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.map_files.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import read_graph
 
 
 def graph(
@@ -26,7 +26,7 @@ def graph(
         print()
         print(topic_table())
         return
-    scene_graph = SceneGraph.load(find_graph(map_folder))
+    scene_graph = read_graph(map_folder)
     print(scene_graph.to_json() if as_json else tree(scene_graph))
 
 

@@ -13,7 +13,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.export import dsg, glb, ros, svg
 from placegraph.tools.export import ply as clouds
-from placegraph.tools.map_files.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import read_graph
 
 
 class Format(StrEnum):
@@ -44,7 +44,7 @@ def export(
 
     dsg: JSON of spark_dsg (Hydra); svg: floor plans; glb: a 3D scene; ply: points of each node; ros: occupancy maps.
     """
-    graph = SceneGraph.load(find_graph(map_folder))
+    graph = read_graph(map_folder)
     try:
         for path in WRITERS[kind](map_folder, graph, out):
             print(path)

@@ -10,9 +10,9 @@ from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import inverse, transform
-from placegraph.tools.evaluate.aligned_map import read_aligned_map
+from placegraph.tools.evaluate.aligned_map import align_folder
 from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY, MIN_FRAMES, house_ground_truth, visibility_of
-from placegraph.tools.map_files.map_folder import read_object_clouds
+from placegraph.tools.map_files.map_folder import read_graph, read_object_clouds
 from placegraph.tools.map_files.ply import write_points
 from placegraph.tools.map_files.trajectory_file import write_trajectory
 from placegraph.tools.simulator.build import build
@@ -95,7 +95,7 @@ def perfect(source, tmp_path):
 
 
 def test_boxes_are_made_anew_from_the_clouds(perfect, source) -> None:
-    aligned_map = read_aligned_map(perfect, inverse(MAP_FROM_TRUE))
+    aligned_map = align_folder(perfect, read_graph(perfect), inverse(MAP_FROM_TRUE))
     truth = read_truth(source)
     by_id = {one.id: one for one in aligned_map.objects}
     for one in truth.objects:
@@ -113,14 +113,14 @@ def test_damaged_clouds_are_named(perfect) -> None:
             read_object_clouds(perfect)
     file.unlink()
     with pytest.raises(SchemaError, match=r"objects\.ply: cannot read"):
-        read_aligned_map(perfect, np.eye(4))
+        align_folder(perfect, read_graph(perfect), np.eye(4))
 
 
 def test_clouds_of_another_run_are_noticed(perfect) -> None:
     write_points(perfect / "objects.ply", np.zeros((0, 3)), {"object": np.zeros(0, np.int32)})
     assert read_object_clouds(perfect) == {}
     with pytest.raises(SchemaError, match="no points of O0"):
-        read_aligned_map(perfect, np.eye(4))
+        align_folder(perfect, read_graph(perfect), np.eye(4))
 
 
 def test_a_perfect_map_is_perfect_wherever_it_starts(cli, perfect, source) -> None:

@@ -6,14 +6,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from placegraph.nodes.camera import detect
-from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.vision.geometry import inverse, transform
-from placegraph.tools.evaluate import absolute_trajectory_error, against_given
 from placegraph.tools.evaluate.trajectory_error import (
+    absolute_trajectory_error,
+    against_given,
     at_times,
     level_alignment,
-    read_poses,
     relative_pose_error,
     trajectory_scores,
 )
@@ -127,22 +126,6 @@ def test_times_of_another_clock_reading_are_matched_by_nearness() -> None:
     found = at_times({0: None, 15_000_000: None, 999_000_000: None}, given)
     assert sorted(found) == [15_000_000, 999_000_000] and found[999_000_000] is given[1_000_000_000]
     assert at_times({}, given) == {} and at_times({0: None}, {}) == {}
-
-
-def test_poses_of_a_file_are_checked(tmp_path) -> None:
-    file = tmp_path / "trajectory.txt"
-    file.write_text("# none\n")
-    assert read_poses(file) == {}
-    file.write_text("# one\n1.5 1 2 3 0 0 1 0\n")
-    assert read_poses(file)[1_500_000_000][:3] == pytest.approx(
-        np.array([[-1, 0, 0, 1], [0, -1, 0, 2], [0, 0, 1, 3.0]])
-    )
-    file.write_text("1.5 1 2 3 0 0 1 0\n1.5 1 2 3 0 0 1 0\n")
-    with pytest.raises(SchemaError, match="a time appears twice"):
-        read_poses(file)
-    file.write_text("1.5 1 2 3 0 0 0 0\n")
-    with pytest.raises(SchemaError, match=r"the pose at 1\.5 has the quaternion 0 0 0 0"):
-        read_poses(file)
 
 
 def test_the_level_alignment_undoes_a_turn_about_z_and_nothing_else() -> None:
