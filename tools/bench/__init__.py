@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from placegraph.tools.bench.map_growth import drawing, grow, growth_table, p95_by_floor
-from placegraph.tools.bench.node_costs import measure, table
+from placegraph.tools.bench.node_costs import cost_table, measure
 from placegraph.tools.bench.reply_contract import fuzz
 
 app = typer.Typer(help="Measure costs on this machine, or put hostile requests.", no_args_is_help=True)
@@ -27,7 +27,7 @@ def bench_nodes(as_json: Json = False) -> None:
     if as_json:
         print(json.dumps([asdict(cost) | {"ratio": cost.ratio} for cost in costs], indent=1))
     else:
-        print(table(costs))
+        print(cost_table(costs))
 
 
 @app.command("growth")

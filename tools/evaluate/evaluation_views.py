@@ -10,7 +10,7 @@ import numpy as np
 
 from placegraph.runtime.arrays import F32, F64, I64, U8, U16, Bool
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.evaluate.box_average_precision import TrueBoxes
+from placegraph.tools.evaluate.network_metrics import TrueBoxes
 from placegraph.tools.simulator.build import generator_version
 from placegraph.tools.simulator.classes import NAMES
 from placegraph.tools.training.samples import MIN_SHARE, Shard, load_shards

@@ -32,7 +32,7 @@ def evaluate_map(
     from placegraph.tools.evaluate.report import map_text, plain
 
     truths = _truths(maps, source or [], against or [])
-    _check(maps, source or [], progress, questions, per_class, write_truth)
+    _check_options(maps, source or [], progress, questions, per_class, write_truth)
     if write_truth is not None:
         write_house_truth(truths[0], write_truth)
     if progress:
@@ -51,27 +51,27 @@ def evaluate_map(
 def _truths(maps: list[Path], source: list[Path], against: list[Path]) -> list[Path]:
     if bool(source) == bool(against):
         raise ConfigError("either --source or --against must say what the map is compared with")
-    option, given = ("--source", source) if source else ("--against", against)
-    if len(given) != len(maps):
-        raise ConfigError(f"{len(maps)} maps and {len(given)} {option}: one for each map is needed, in the same order")
+    option, truths = ("--source", source) if source else ("--against", against)
+    if len(truths) != len(maps):
+        raise ConfigError(f"{len(maps)} maps and {len(truths)} {option}: one for each map is needed, in the same order")
     if len(set(maps)) != len(maps):
         raise ConfigError("a map is named twice")
-    return given
+    return truths
 
 
-def _check(
+def _check_options(
     maps: list[Path], source: list[Path], progress: bool, questions: bool, per_class: bool, write_truth: Path | None
 ) -> None:
-    """What only one house, or only a house, can be asked for."""
+    """Raises ConfigError for options that need one map, or a house, and do not have it."""
     from placegraph.tools.evaluate.map_evaluation import has_truth
 
-    for asked, option in ((questions, "--questions"), (per_class, "--per-class"), (write_truth, "--write-truth")):
-        if asked and (len(maps) > 1 or progress):
+    options = {"--questions": questions, "--write-truth": write_truth is not None, "--per-class": per_class}
+    for option, used in options.items():
+        if used and (len(maps) > 1 or progress):
             raise ConfigError(f"{option} goes with one map and without --progress")
-    if questions or write_truth or progress:
-        wanted = "--questions" if questions else "--write-truth" if write_truth else "--progress"
-        if not source:
-            raise ConfigError(f"{wanted} needs a house with its truth as --source")
+    for option, used in {**options, "--progress": progress, "--per-class": False}.items():
+        if used and not source:
+            raise ConfigError(f"{option} needs a house with its truth as --source")
     if source and (questions or per_class) and not has_truth(source[0]):
         raise ConfigError(f"{source[0]}: no truth/ here; --questions and --per-class need a house with its truth")
 

@@ -81,7 +81,7 @@ def test_the_queue_that_the_bus_is_compared_with_leaves_no_thread_behind(quick):
 
 
 def test_the_table_is_aligned():
-    text = tool.table([Cost("short", 1.0, "one", 2.0), Cost("a longer part", 100.0, "another", 50.0)])
+    text = tool.cost_table([Cost("short", 1.0, "one", 2.0), Cost("a longer part", 100.0, "another", 50.0)])
     header, first, second = text.splitlines()
     assert header.split() == ["part", "ms", "baseline", "ms", "ratio"]
     assert first.endswith("0.50") and second.endswith("2.00")
