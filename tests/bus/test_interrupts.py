@@ -17,7 +17,7 @@ from placegraph.runtime.config import RunConfig, build
 from placegraph.runtime.errors import PlacegraphError
 from placegraph.runtime.inline import Inline
 from placegraph.tools.map_files.map_folder import GRAPH
-from placegraph.tools.run import _keep, run_dataflow
+from placegraph.tools.run import _save_partial_map, run_dataflow
 from placegraph.tools.run.map_collector import MapCollector
 
 NODES = """[nodes.camera]
@@ -104,15 +104,17 @@ def test_a_run_that_fails_keeps_what_it_mapped(tmp_path: Path, writable: bool) -
     nodes = {"camera": camera, "pose": {"method": "given"}, "keyframe": {}, "instances": {"model": "drawn_scene"}}
     dataflow = build(RunConfig(nodes=nodes | {"fusion": {"map_every": 1}, "hierarchy": {}}))
     collector, folder = MapCollector(dataflow), tmp_path / "map"
-    assert _keep(collector, folder) == "" and not folder.exists()
+    assert _save_partial_map(collector, folder) == "" and not folder.exists()
     with Inline(dataflow, collector.add) as shell:
         for message in dataflow.source.messages():
             if collector.graph is not None:
                 break
             shell.feed(message)
     if writable:
-        assert f"{folder} holds graph revision {collector.graph.revision}, not the last one" in _keep(collector, folder)
+        assert f"{folder} holds graph revision {collector.graph.revision}, not the last one" in _save_partial_map(
+            collector, folder
+        )
         assert (folder / GRAPH).exists()
     else:
         folder.write_text("")
-        assert "the map cannot be written either: " in _keep(collector, folder)
+        assert "the map cannot be written either: " in _save_partial_map(collector, folder)

@@ -51,9 +51,9 @@ def bench_fuzz(
     mode: Annotated[str, typer.Option(help="Of the requests: program, rules or deductive.")] = "program",
     seed: Annotated[int, typer.Option(min=0, help="Of the requests and of the house they are about.")] = 0,
 ) -> None:
-    """Put broken and hostile requests to the query server and the grounding node, and check every reply.
+    """Put broken and hostile requests, and check every reply.
 
-    Exit status: 1 when a reply broke its contract.
+    They go to the query server and the grounding node, in this process. Exit status: 1 when a reply broke its contract.
     """
     outcome = fuzz(requests, mode=mode, seed=seed)
     print(json.dumps(outcome.document(), indent=1))

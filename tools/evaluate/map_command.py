@@ -23,7 +23,9 @@ def evaluate_map(
     write_truth: Annotated[Path | None, typer.Option(help="Write the house's truth as a truth file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Compare a map with its ground truth: trajectory, and whichever of floors, rooms, locations, objects it has.
+    """Compare maps with their ground truth, layer by layer.
+
+    Scored are the trajectory and whichever of floors, rooms, locations and objects the truth has.
 
     Several maps, each with its own --source or --against in the same order, give a table with the means. A map is
     rotated about z and shifted so that the trajectories fit best; it is not levelled.
