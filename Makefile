@@ -23,7 +23,7 @@ demo: $(VENV)/.installed
 	@for question in $(QUESTIONS); do \
 	    echo; echo "? $$question"; $(BIN)/placegraph ask $(OUT) "$$question" || [ $$? -eq 3 ] || exit 1; \
 	done
-	@echo; echo "against the truth:"; $(BIN)/placegraph evaluate $(OUT) --source $(HOUSE)
+	@echo; echo "against the truth:"; $(BIN)/placegraph evaluate map $(OUT) --source $(HOUSE)
 	@echo; echo "the plan:    $(HOUSE)/plan.png"; echo "the map:     $(OUT)"; \
 	    echo "look at it:  $(BIN)/placegraph view $(OUT)"
 

@@ -1,4 +1,4 @@
-"""Ask a saved map or a running system where something is."""
+"""`placegraph ask`: where something is, in a saved map or a running system."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from placegraph.runtime.bus.session import Bus, BusConfig
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.query.request import make_question
 from placegraph.tools.query.offline_query import OfflineQuery
-from placegraph.tools.query.question_file import LineAnswerer, answer_all
 
 NOT_FOUND = 3
 
@@ -21,11 +20,9 @@ NOT_FOUND = 3
 def ask(
     where: Annotated[
         str, typer.Argument(metavar="MAP|live", help="A map folder, a graph file, an object list; live: a running one.")
-    ] = "",
-    text: Annotated[
-        str | None, typer.Argument(metavar="TEXT", help='What to look for: "the vase near the window upstairs".')
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the reply as JSON (README, Asking).")] = False,
+    ],
+    text: Annotated[str, typer.Argument(metavar="TEXT", help='What to look for: "the vase near the window upstairs".')],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the reply as JSON.")] = False,
     k: Annotated[int, typer.Option(help="How many candidates to list.")] = 5,
     mode: Annotated[
         str, typer.Option(help="program: read by the model; rules: by phrases; deductive: a call for each level.")
@@ -33,24 +30,14 @@ def ask(
     pose: Annotated[
         str, typer.Option(help="Where the asker stands: x,y,z[,yaw]; metres, degrees from x, world frame.")
     ] = "",
-    graph: Annotated[Path | None, typer.Option(help="With --batch: what is asked, as MAP.")] = None,
-    batch: Annotated[Path | None, typer.Option(help="Instead of TEXT: questions (README, Other data).")] = None,
-    out: Annotated[Path | None, typer.Option(help="With --batch: the file for the answers.")] = None,
     endpoint: Annotated[str, typer.Option(help="live: where the hub listens.")] = BusConfig().endpoint,
     prefix: Annotated[str, typer.Option(help="live: first part of the keys.")] = BusConfig().prefix,
     timeout_s: Annotated[float, typer.Option(help="live: how long to wait for the reply.")] = 35.0,
 ) -> None:
-    """Find an object in a saved map, an object list or the running system; with --batch, answer a file of questions.
+    """Find an object in a saved map, an object list or the running system.
 
-    Exit status: 0 found, or a batch done; 3 not in the map, 1 the question could not be answered, 2 wrong usage.
+    Exit status: 0 found, 3 not in the map, 1 the question could not be answered, 2 wrong usage.
     """
-    if batch is not None:
-        if where or text is not None or as_json or pose or out is None:
-            raise typer.BadParameter("takes --out, and no MAP, TEXT, --json or --pose", param_hint="--batch")
-        _ask_all(batch, out, graph, k, mode)
-        return
-    if graph is not None or out is not None or not where or text is None:
-        raise typer.BadParameter("expected MAP TEXT, or --batch QUESTIONS --out ANSWERS [--graph MAP]")
     asker_pose = _pose(pose)
     question = make_question(text, question_id="Q1", k=k, mode=mode, pose=asker_pose)
     if where == "live":
@@ -63,15 +50,6 @@ def ask(
     print(json.dumps(reply, sort_keys=True) if as_json else _in_words(reply))
     if reply["status"] != "found":
         raise typer.Exit(NOT_FOUND if reply["status"] == "not_in_map" else 1)
-
-
-def _ask_all(questions: Path, out: Path, graph: Path | None, k: int, mode: str) -> None:
-    make_question("-", k=k, mode=mode)  # checks the options once, not in every line
-    with OfflineQuery() as query:
-        if graph is not None:
-            query.check(graph)
-        counts = answer_all(LineAnswerer(query, questions.parent, graph, k=k, mode=mode), questions, out)
-    print(f"{counts.text()}: {out}")
 
 
 def _pose(text: str) -> list[float] | None:

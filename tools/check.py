@@ -1,4 +1,4 @@
-"""Check a dataflow file: settings, wiring, model files."""
+"""`placegraph check`: settings, wiring and model files of a dataflow file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def check(
     source: Annotated[Path | None, typer.Option(help="Data set folder or recording to check it with.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the effective settings as JSON.")] = False,
 ) -> None:
-    """Build every node without running it, load its models, and print the effective settings."""
+    """Check a dataflow file: build its nodes, load their models, print all settings."""
     os.environ.setdefault("DEPTHAI_LEVEL", "error")  # its warnings go to standard output, amid our JSON
     settings = read(config)
     settings = with_settings(settings, {"camera": source_settings(settings, source)})

@@ -12,7 +12,7 @@ from placegraph.runtime.messages import Message
 from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import NODES, Node, available, plugin
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.map_files.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import read_graph
 
 
 def graph(
@@ -22,7 +22,7 @@ def graph(
     as_json: Annotated[bool, typer.Option("--json", help="Print the graph's canonical JSON.")] = False,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of graph.json.")] = False,
 ) -> None:
-    """Print the inputs and outputs of all nodes; with MAP, its building, floors, rooms, locations, objects."""
+    """Print the dataflow as tables or, with MAP, the hierarchy of a map."""
     if schema:
         print(json.dumps(SceneGraph.json_schema(), indent=1))
         return
@@ -31,7 +31,7 @@ def graph(
         print()
         print(topic_table())
         return
-    scene_graph = SceneGraph.load(find_graph(map_folder))
+    scene_graph = read_graph(map_folder)
     print(scene_graph.to_json() if as_json else tree(scene_graph))
 
 

@@ -37,10 +37,10 @@ Target = Annotated[Path, typer.Option("--to", help="Folder that the files are wr
 @app.command("list")
 def list_weights(models: ModelDirs = None) -> None:
     """Show every known network: name, family, licence, size, and where its files were found."""
-    for name, listed in sorted(known_weights(models or ()).items()):
-        entry = listed.entry
+    for name, network in sorted(known_weights(models or ()).items()):
+        entry = network.entry
         megabytes = sum(file.size_bytes for file in entry.files.values()) / 1e6
-        paths = {role: find_file(listed, role, models or ()) for role in entry.files}
+        paths = {role: find_file(network, role, models or ()) for role in entry.files}
         missing = [entry.files[role].file for role, path in paths.items() if path is None]
         places = sorted({str(path.parent) for path in paths.values() if path is not None})
         where = f"missing {', '.join(missing)}" if missing else ", ".join(places)
@@ -53,10 +53,12 @@ def verify(
     models: ModelDirs = None,
 ) -> None:
     """Check the checksums of networks and that each loads as its family; exit code 1 if one does not."""
-    known = known_weights(models or ())
+    networks = known_weights(models or ())
     failed = False
-    for name in names or sorted(known):
-        if not names and any(find_file(known[name], role, models or ()) is None for role in known[name].entry.files):
+    for name in names or sorted(networks):
+        if not names and any(
+            find_file(networks[name], role, models or ()) is None for role in networks[name].entry.files
+        ):
             print(f"{name:20} missing")
             continue
         try:
@@ -86,18 +88,18 @@ def fetch(
     name: Annotated[str, typer.Argument(help="A known network.")], to: Target = WEIGHTS_DIR, models: ModelDirs = None
 ) -> None:
     """Download the files of a network that are not there yet; a broken download is resumed the next time."""
-    known = known_weights(models or ())
-    if name not in known:
-        raise ModelError(f"no weights named {name!r}; there are: {', '.join(sorted(known))}")
-    listed = known[name]
-    for role, file in listed.entry.files.items():
-        if find_file(listed, role, (*(models or ()), to)) is not None:
-            print(f"present  {find_verified_file(listed, role, (*(models or ()), to))}")
+    networks = known_weights(models or ())
+    if name not in networks:
+        raise ModelError(f"no weights named {name!r}; there are: {', '.join(sorted(networks))}")
+    network = networks[name]
+    for role, file in network.entry.files.items():
+        if find_file(network, role, (*(models or ()), to)) is not None:
+            print(f"present  {find_verified_file(network, role, (*(models or ()), to))}")
         else:
             print(f"fetched  {fetch_file(name, file, to)}")
 
 
-def import_files(folder: Path, to: Path, known: Mapping[str, ManifestEntry]) -> list[Path]:
+def import_files(folder: Path, to: Path, networks: Mapping[str, ManifestEntry]) -> list[Path]:
     """Copy every file of the known weights that lies in `folder` into `to`; returns the copies, sorted.
 
     Nothing is copied unless all of them are right.
@@ -107,22 +109,22 @@ def import_files(folder: Path, to: Path, known: Mapping[str, ManifestEntry]) -> 
     """
     if not folder.is_dir():
         raise ModelError(f"{folder}: no such folder")
-    wanted: dict[str, set[str]] = {}  # several networks may use files of one name
-    for listed in known.values():
-        for file in listed.entry.files.values():
-            wanted.setdefault(file.file, set()).add(file.sha256)
-    found = [folder / name for name in sorted(wanted) if (folder / name).is_file()]
-    if not found:
-        raise ModelError(f"{folder}: holds none of the known files: {', '.join(sorted(wanted))}")
-    for path in found:
-        if (digest := sha256(path)) not in wanted[path.name]:
-            raise ModelError(f"{path}: sha256 is {digest}, expected {' or '.join(sorted(wanted[path.name]))}")
+    checksums: dict[str, set[str]] = {}  # several networks may use files of one name
+    for network in networks.values():
+        for file in network.entry.files.values():
+            checksums.setdefault(file.file, set()).add(file.sha256)
+    paths = [folder / name for name in sorted(checksums) if (folder / name).is_file()]
+    if not paths:
+        raise ModelError(f"{folder}: holds none of the known files: {', '.join(sorted(checksums))}")
+    for path in paths:
+        if (digest := sha256(path)) not in checksums[path.name]:
+            raise ModelError(f"{path}: sha256 is {digest}, expected {' or '.join(sorted(checksums[path.name]))}")
     to.mkdir(parents=True, exist_ok=True)
-    for path in found:
+    for path in paths:
         part = to / f"{path.name}.part"
         shutil.copyfile(path, part)
         part.replace(to / path.name)
-    return [to / path.name for path in found]
+    return [to / path.name for path in paths]
 
 
 def fetch_file(name: str, file: FileEntry, to: Path) -> Path:

@@ -13,7 +13,7 @@ from placegraph.runtime.errors import QueryError
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.runtime.scene_graph.json_types import rounded
 from placegraph.runtime.scene_graph.route import Route, find_route
-from placegraph.tools.map_files.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import read_graph
 
 LAYERS = ("room", "location", "object")  # in this order a name is looked up
 
@@ -24,11 +24,12 @@ def path(
     goal: Annotated[str, typer.Argument(metavar="TO", help="The same.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print the shortest route between two places of a map: rooms, doors and stairs, metres, way points.
+    """Print the shortest route between two places of a map.
 
-    It starts and ends in the middle of a room, or in front of an object. Exit status 1: no route is known.
+    Rooms, doors and stairs on the way, metres, way points. A route starts and ends in the middle of a room or in front
+    of an object. Exit status 1: no route is known.
     """
-    graph = SceneGraph.load(find_graph(map_folder))
+    graph = read_graph(map_folder)
     a, b = find_place(graph, start), find_place(graph, goal)
     for node in (a, b):
         if node.layer == "object" and node.approach is None:

@@ -34,7 +34,7 @@ def perceive(
     frames: Annotated[int, typer.Option(min=1, max=24, help="How many frames, evenly spaced.")] = 6,
     of: Annotated[int, typer.Option(min=1, help="Out of so many first frames of the source.")] = 500,
 ) -> None:
-    """Run the networks of a dataflow on some frames and draw what they see, side by side."""
+    """Draw what the networks of a dataflow see on some frames, side by side."""
     settings = read(config)
     context = Context(model_dirs=tuple(settings.run.model_dirs), threads=2)
     nodes = [build_node(name, settings.nodes[name], context) for name in NETWORK_NODES if name in settings.nodes]

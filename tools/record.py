@@ -1,4 +1,4 @@
-"""Record a camera: every frame exactly, nothing else; map it later."""
+"""`placegraph record`: a camera's frames into a recording, exactly and without mapping them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ def record(
     limit: Annotated[int, typer.Option(min=0, help="Stop after so many frames (0: all, or until Ctrl-C).")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress table.")] = False,
 ) -> None:
-    """Record a camera's frames; `placegraph run CONFIG --source OUT/run.rrd` maps them later."""
+    """Record a camera's frames exactly, to be mapped later.
+
+    `placegraph run CONFIG --source OUT/run.rrd` maps them.
+    """
     settings = read(config)
     if "camera" not in settings.nodes:
         raise ConfigError(f"{config}: there is no [nodes.camera] to record")

@@ -22,7 +22,7 @@ def view(
     ] = None,
     web: Annotated[bool, typer.Option("--web", help="Serve the viewer to a browser on this machine only.")] = False,
 ) -> None:
-    """Open a recording in the Rerun viewer."""
+    """Open the recording of a run in the Rerun viewer."""
     command = viewer_command(path, screenshot, web)
     try:
         code = subprocess.run(command, check=False).returncode

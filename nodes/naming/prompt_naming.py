@@ -3,7 +3,7 @@
 Source: paper, "Room Layer" ("we prompt LLM with a list of object and location tags it contains") and "Location Layer".
 For larger models than the packaged SmolLM2-135M, which mostly gives the first type that it is offered: by the true
 lists of objects of houses 400 to 409 it names 18 of 110 rooms and 10 of 215 locations right, the evidence table 103 and
-210 (tests/nodes/naming/measure_place_names.py).
+210 (tests/measurements/place_names.py).
 """
 
 from __future__ import annotations

@@ -15,15 +15,7 @@ from placegraph.runtime.query.reply import Reply
 
 pytestmark = pytest.mark.bus
 
-PLAIN_ZENOH = """
-import json, sys, zenoh
-config = zenoh.Config()
-config.insert_json5("mode", '"client"')
-config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
-with zenoh.open(config) as session:
-    for reply in session.get("placegraph/ask", payload=json.dumps({"text": sys.argv[2]}), timeout=60):
-        print(reply.ok.payload.to_string())
-"""
+EXAMPLE = Path(__file__).parents[2] / "examples" / "ask_over_zenoh.py"
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +47,7 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path
 def test_a_plain_zenoh_session_gets_a_json_reply(mapped: tuple[str, Path]) -> None:
     endpoint, _ = mapped
     asked = subprocess.run(
-        [sys.executable, "-c", PLAIN_ZENOH, endpoint, "find the table"], capture_output=True, text=True, timeout=90
+        [sys.executable, str(EXAMPLE), "find the table", endpoint], capture_output=True, text=True, timeout=90
     )
     reply = json.loads(asked.stdout)
     assert reply["status"] == "found" and reply["name"] == "table", asked.stdout

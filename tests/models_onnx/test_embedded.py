@@ -9,7 +9,7 @@ from placegraph.models_onnx import Detector, Segmenter, Tagger
 from placegraph.models_onnx.load import load
 from placegraph.models_onnx.manifest import EMBEDDED_DIR
 from placegraph.tools.evaluate.evaluation_views import EvaluationView, evaluation_views
-from placegraph.tools.evaluate.mask_iou import mask_overlaps
+from placegraph.tools.evaluate.network_metrics import mask_ious
 from placegraph.tools.simulator.object_classes import NAMES
 from placegraph.tools.training.data_augmentation import load_shards
 from placegraph.tools.training.view_rendering import EVALUATION_SEEDS, render_house
@@ -67,7 +67,7 @@ def test_the_segmenter_fills_true_boxes(views: list[EvaluationView]) -> None:
     segmenter = load("house_segmenter")
     assert isinstance(segmenter, Segmenter)
     ious = [
-        mask_overlaps(segmenter.segment(view.color, view.depth_m, view.prompt_boxes), view.prompt_masks())
+        mask_ious(segmenter.segment(view.color, view.depth_m, view.prompt_boxes), view.prompt_masks())
         for view in views
         if len(view.prompt_boxes)
     ]

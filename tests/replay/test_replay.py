@@ -5,10 +5,13 @@ from typing import Any
 
 import pytest
 
+from placegraph.runtime.messages import Correction, Graph, Map
 from placegraph.runtime.node import NODES, available
+from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.graph import node_types
-from placegraph.tools.references import LEFT_OUT, RECORDING, SUMMARY
+from placegraph.tools.references import RECORDING, SUMMARY
 from placegraph.tools.references.recorded_steps import ReferenceRecording, differences, summary
+from placegraph.tools.references.reference_runs import LEFT_OUT
 
 HERE = Path(__file__).parent
 CONSUMERS = sorted(name for name, kind in node_types().items() if kind.inputs)
@@ -60,6 +63,18 @@ def test_each_kind_that_a_node_gives_is_in_its_reference(reference: ReferenceRec
 
 def test_the_language_model_is_asked_in_both_ways(reference: ReferenceRecording) -> None:
     assert {key.split('"')[1] for key in reference.replies} == {"complete", "log_probabilities"}
+
+
+def test_it_holds_two_floors_keyframes_that_a_loop_moved_and_a_retired_object(reference: ReferenceRecording) -> None:
+    graphs = [message for message in reference.messages if isinstance(message, Graph)]
+    assert len(SceneGraph.from_json(graphs[-1].json).layer("floor")) == 2
+    moved = [
+        message for message in reference.messages if isinstance(message, Correction) and len(message.moved_frame_ids)
+    ]
+    taken = {id(reference.messages[i]) for i, _ in reference.steps["fusion"]}
+    assert moved and all(id(correction) in taken for correction in moved)
+    retired = [m for m in reference.messages if isinstance(m, Map) and len(m.retired_ids)]
+    assert retired and "vase" in retired[-1].retired_tag_names and "vase" not in retired[-1].tag_names
 
 
 def test_the_summary_is_that_of_the_recording(reference: ReferenceRecording) -> None:

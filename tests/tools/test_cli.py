@@ -3,16 +3,41 @@ import sys
 
 import pytest
 
-from placegraph.tools.cli import COMMANDS
+from placegraph.tools.cli import PANELS
 
-NAMES = [*(command.__name__ for command in COMMANDS), "models"]
+NAMES = [name for commands in PANELS.values() for name in commands]
 
 
 def test_without_a_command_it_lists_them_all(cli) -> None:
     done = cli()
     assert done.code == 2  # wrong usage
-    listed = [line.split()[1] for line in (done.out + done.err).splitlines() if line.startswith("│ ")]
-    assert listed[-len(NAMES) :] == NAMES or set(NAMES) <= set(listed)
+    lines = (done.out + done.err).splitlines()
+    panels = [line.split("─ ")[1].split(" ─")[0] for line in lines if line.startswith("╭─ ")]
+    assert panels[1:] == list(PANELS)
+
+
+def test_in_100_columns_each_command_is_one_line(cli, monkeypatch) -> None:
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 100)
+    lines = [line for line in cli("--help").out.splitlines() if line.startswith("│ ")]
+    assert [line.split()[1] for line in lines[-len(NAMES) :]] == NAMES
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("evaluate out/demo --source house", "evaluate map"),
+        ("evaluate-networks --json", "evaluate networks"),
+        ("evaluate-grounding out/demo", "evaluate grounding"),
+        ("bench", "bench nodes"),
+        ("bench --json", "bench nodes"),
+        ("bench --growth out.svg --floors 2", "bench growth SVG"),
+        ("bench --fuzz=3", "bench fuzz REQUESTS"),
+        ("ask --graph room.json --batch q.jsonl --out a.jsonl", "ask-batch QUESTIONS --out ANSWERS"),
+    ],
+)
+def test_an_old_command_names_the_new_one(cli, old, new) -> None:
+    done = cli(*old.split())
+    assert (done.code, done.out, done.reason) == (2, "", f"this command is now `placegraph {new}`")
 
 
 @pytest.mark.parametrize("name", NAMES)

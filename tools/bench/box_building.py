@@ -79,20 +79,24 @@ def camera_pose(eye: F64, heading_rad: float) -> F64:
 def view(frame_id: int, boxes: list[Box], world_from_camera: F64) -> tuple[Keyframe, Segments]:
     """What a camera sees of the boxes, and the masks of the named ones; ten frames a second."""
     depth_m, hit = trace(boxes, world_from_camera)
-    masks = [(box.name, hit == i) for i, box in enumerate(boxes) if box.name and (hit == i).sum() > MIN_MASK_PX]
-    bits, offsets = Segments.pack([mask for _, mask in masks])
     color = np.repeat((40 + 10 * (hit + 1))[..., None], 3, axis=2).astype(np.uint8)
     keyframe = Keyframe(
         frame_id=frame_id, stamp_ns=frame_id * 10**8, color=color, depth=np.rint(depth_m * 1000).astype(np.uint16),
         depth_unit_m=0.001, intrinsics=INTRINSICS, world_from_camera=world_from_camera,
     )  # fmt: skip
-    segments = Segments(
+    return keyframe, true_segments(frame_id, boxes, hit)
+
+
+def true_segments(frame_id: int, boxes: list[Box], hit: I64) -> Segments:
+    """The masks of the named boxes in an image of box indices (H, W)."""
+    masks = [(box.name, hit == i) for i, box in enumerate(boxes) if box.name and (hit == i).sum() > MIN_MASK_PX]
+    bits, offsets = Segments.pack([mask for _, mask in masks])
+    return Segments(
         frame_id=frame_id, stamp_ns=frame_id * 10**8, names=tuple(name for name, _ in masks),
         scores=np.full(len(masks), 0.8, np.float32),
         boxes_px=np.array([(0, 0, WIDTH, HEIGHT)] * len(masks), np.int32).reshape(-1, 4),
         mask_bits=bits, mask_offsets=offsets,
     )  # fmt: skip
-    return keyframe, segments
 
 
 def trace(boxes: list[Box], world_from_camera: F64) -> tuple[F64, I64]:

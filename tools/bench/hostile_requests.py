@@ -69,19 +69,11 @@ def _request(random: np.random.Generator, text: str) -> bytes:
     return json.dumps(fields, ensure_ascii=bool(random.random() < 0.5)).encode()
 
 
-def _noise(random: np.random.Generator, texts: Sequence[str]) -> bytes:
-    return random.bytes(int(random.integers(0, 300)))
-
-
-def _letters(random: np.random.Generator, texts: Sequence[str]) -> bytes:
+def _letters(random: np.random.Generator) -> bytes:
     top = _pick(random, (0x7F, 0x250, 0x3000, 0x10FFFF))
     points = random.integers(0, top + 1, int(random.integers(1, 200)))
     text = "".join(map(chr, points))
     return json.dumps({"text": text}).encode()  # half surrogate pairs too, as JSON spells them
-
-
-def _foreign(random: np.random.Generator, texts: Sequence[str]) -> bytes:
-    return _request(random, _mutation(random, _pick(random, FOREIGN)))
 
 
 def _steering(random: np.random.Generator, texts: Sequence[str]) -> bytes:
@@ -89,29 +81,21 @@ def _steering(random: np.random.Generator, texts: Sequence[str]) -> bytes:
     return _request(random, _pick(random, (parts[1], " ".join(parts), " ".join(parts[::-1])))[:MAX_TEXT])
 
 
-def _absent(random: np.random.Generator, texts: Sequence[str]) -> bytes:
+def _absent(random: np.random.Generator) -> bytes:
     a, b = _pick(random, ABSENT_IDS), _pick(random, ABSENT_IDS)
     forms = (a, f"where is {a}", f"the chair near {a}", f"{a} between {b} and the bed", f"the lamp in {a}")
     return _request(random, _pick(random, forms))
 
 
-def _long(random: np.random.Generator, texts: Sequence[str]) -> bytes:
+def _long(random: np.random.Generator) -> bytes:
     word = _pick(random, ("chair", "a", "o", "the chair near ", "not ", "é", "9", "🪑"))
     length = int(_pick(random, (MAX_TEXT, MAX_TEXT + 1, 10_000, MAX_BYTES + 1, 200)))
     return _request(random, (word * length)[:length])
 
 
-def _marks(random: np.random.Generator, texts: Sequence[str]) -> bytes:
+def _marks(random: np.random.Generator) -> bytes:
     alphabet = "0123456789.,-+eE/%$#@!?()[]{}'\"\\\n\t\x00" + EMOJI
     return _request(random, "".join(_pick(random, alphabet) for _ in range(int(random.integers(1, 80)))))
-
-
-def _real(random: np.random.Generator, texts: Sequence[str]) -> bytes:
-    return _request(random, _pick(random, texts))
-
-
-def _mutated(random: np.random.Generator, texts: Sequence[str]) -> bytes:
-    return _request(random, _mutation(random, _pick(random, texts)))
 
 
 def _wrong(random: np.random.Generator, texts: Sequence[str]) -> bytes:
@@ -151,15 +135,15 @@ def _mutation(random: np.random.Generator, text: str) -> str:
 
 
 KINDS: dict[str, RequestMaker] = {
-    "noise": _noise,
-    "letters": _letters,
-    "foreign": _foreign,
+    "noise": lambda random, texts: random.bytes(int(random.integers(0, 300))),
+    "letters": lambda random, texts: _letters(random),
+    "foreign": lambda random, texts: _request(random, _mutation(random, _pick(random, FOREIGN))),
     "steering": _steering,
-    "absent": _absent,
-    "long": _long,
-    "marks": _marks,
+    "absent": lambda random, texts: _absent(random),
+    "long": lambda random, texts: _long(random),
+    "marks": lambda random, texts: _marks(random),
     "wrong": _wrong,
     "cut": _cut,
-    "real": _real,
-    "mutated": _mutated,
+    "real": lambda random, texts: _request(random, _pick(random, texts)),
+    "mutated": lambda random, texts: _request(random, _mutation(random, _pick(random, texts))),
 }

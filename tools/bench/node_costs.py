@@ -24,6 +24,7 @@ from placegraph.runtime.messages import Keyframe
 from placegraph.runtime.messages.codec import decode, encode
 from placegraph.runtime.node import Context, Node, build_node
 from placegraph.runtime.recording import RecordingWriter
+from placegraph.tools.evaluate.report import table
 
 IMAGE = {"width": 640, "height": 480}  # what an OAK-D gives
 REPEATS = 30
@@ -198,15 +199,7 @@ def measure() -> list[Cost]:
     return [*codec_costs(keyframe), bus_cost(keyframe), pose_cost(), *fusion_costs(), recorder_cost(keyframe)]
 
 
-def table(costs: list[Cost]) -> str:
+def cost_table(costs: list[Cost]) -> str:
     """Aligned text, one row a cost."""
-    rows = [("part", "ms", "baseline", "ms", "ratio")]
-    rows += [(c.part, f"{c.ms:.3f}", c.baseline, f"{c.baseline_ms:.3f}", f"{c.ratio:.2f}") for c in costs]
-    widths = [max(len(row[i]) for row in rows) for i in range(5)]
-    lines = []
-    for row in rows:
-        cells = [
-            text.ljust(w) if i in (0, 2) else text.rjust(w) for i, (text, w) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines)
+    rows = [(c.part, f"{c.ms:.3f}", c.baseline, f"{c.baseline_ms:.3f}", f"{c.ratio:.2f}") for c in costs]
+    return table([("part", "ms", "baseline", "ms", "ratio"), *rows], left=(0, 2))

@@ -12,7 +12,7 @@ from placegraph.runtime.arrays import F64, Points
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import bounding_box, transform
-from placegraph.tools.map_files.map_folder import OBJECTS, find_graph, read_object_clouds
+from placegraph.tools.map_files.map_folder import OBJECTS, read_object_clouds
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +46,16 @@ class AlignedMap:
 EMPTY_MAP = AlignedMap(np.zeros((0, 2)), (), (), ())
 
 
-def read_aligned_map(folder: Path, true_from_map: F64) -> AlignedMap:
-    """Read a map folder's graph and object clouds and move them by a rotation about z and a shift (4, 4).
-
-    A rotated box would be too large, so the boxes are computed again from the moved clouds. Raises SchemaError.
-    """
-    graph = SceneGraph.load(find_graph(folder))
+def align_folder(folder: Path, graph: SceneGraph, true_from_map: F64) -> AlignedMap:
+    """`align_map` with the graph of a map folder and the folder's object clouds."""
     return align_map(graph, read_object_clouds(folder), true_from_map, str(folder / OBJECTS))
 
 
 def align_map(graph: SceneGraph, clouds: Mapping[str, Points], true_from_map: F64, source: str) -> AlignedMap:
     """A graph and the points (N, 3) of its objects by id, moved by a rotation about z and a shift (4, 4).
 
-    Raises SchemaError, which names the `source` of the points, when those of an object are missing.
+    A rotated box would be too large, so the boxes are computed again from the moved clouds. Raises SchemaError, which
+    names the `source` of the points, when those of an object are missing.
     """
     floors = graph.layer("floor")
     floor_index = {floor.id: i for i, floor in enumerate(floors)}

@@ -10,7 +10,7 @@ import numpy as np
 
 from placegraph.runtime.arrays import F32, F64, I64, U8, U16, Bool
 from placegraph.runtime.errors import ConfigError
-from placegraph.tools.evaluate.box_average_precision import TrueBoxes
+from placegraph.tools.evaluate.network_metrics import TrueBoxes
 from placegraph.tools.simulator.house_frames import generator_version
 from placegraph.tools.simulator.object_classes import NAMES
 from placegraph.tools.training.data_augmentation import MIN_SHARE, Shard, load_shards

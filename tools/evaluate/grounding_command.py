@@ -1,4 +1,4 @@
-"""`placegraph evaluate-grounding`: house questions with and without the parts of grounding, in one table."""
+"""`placegraph evaluate grounding`: house questions with and without the parts of grounding, in one table."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ def evaluate_grounding(
     threads: Annotated[int, typer.Option(min=1, help="Threads of the language model.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Ask questions of houses whose one right answer is known, of their true graphs or of maps of them."""
+    """Ask a house's questions, with and without parts of grounding.
+
+    They are asked of its true graph or of a map.
+    """
     scenes = _scenes(maps or [], source or [], houses, count)
     runner = VariantRunner(threads)
     scores: dict[str, dict[str, Any]] = {}

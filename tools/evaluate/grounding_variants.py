@@ -27,10 +27,10 @@ from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.messages import Question
 from placegraph.runtime.query.request import make_question
 from placegraph.runtime.scene_graph import Node, SceneGraph
-from placegraph.tools.evaluate.aligned_map import read_aligned_map
+from placegraph.tools.evaluate.aligned_map import align_folder
 from placegraph.tools.evaluate.grounding_scores import QuestionResult, eye_in_map, read_questions
-from placegraph.tools.evaluate.trajectory_error import level_alignment, paired
-from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph
+from placegraph.tools.evaluate.trajectory_error import level_alignment, paired, positions_of
+from placegraph.tools.map_files.map_folder import TRAJECTORY, read_graph
 from placegraph.tools.map_files.trajectory_file import read_trajectory
 from placegraph.tools.simulator.ground_truth_graph import ground_truth_graph
 from placegraph.tools.simulator.house_frames import generate_house
@@ -73,10 +73,11 @@ def map_scene(folder: Path, source: Path) -> QuestionScene:
     if not house_questions:
         raise SourceError(f"{source}: no questions in truth/questions.json")
     given = detect_source(str(source))(source, {}).given_poses()
-    estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
+    estimated, true = paired(positions_of(read_trajectory(folder / TRAJECTORY)), given)
+    graph = read_graph(folder)
     true_from_map = level_alignment(estimated, true)
-    boxes = {thing.id: thing.box for thing in read_aligned_map(folder, true_from_map).objects}
-    return QuestionScene(str(folder), SceneGraph.load(find_graph(folder)), house_questions, true_from_map, boxes)
+    boxes = {thing.id: thing.box for thing in align_folder(folder, graph, true_from_map).objects}
+    return QuestionScene(str(folder), graph, house_questions, true_from_map, boxes)
 
 
 class VariantRunner:

@@ -11,8 +11,7 @@ from typing import Any
 
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
-from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.evaluate.aligned_map import read_aligned_map
+from placegraph.tools.evaluate.aligned_map import align_folder
 from placegraph.tools.evaluate.connection_scores import connection_scores
 from placegraph.tools.evaluate.ground_truth import (
     ClassVocabulary,
@@ -25,8 +24,8 @@ from placegraph.tools.evaluate.ground_truth import (
 from placegraph.tools.evaluate.grounding_scores import ask_all, grounding_scores, read_questions
 from placegraph.tools.evaluate.layer_scores import map_scores
 from placegraph.tools.evaluate.place_name_scores import place_name_scores
-from placegraph.tools.evaluate.trajectory_error import level_alignment, paired
-from placegraph.tools.map_files.map_folder import TRAJECTORY, find_graph
+from placegraph.tools.evaluate.trajectory_error import level_alignment, paired, positions_of
+from placegraph.tools.map_files.map_folder import TRAJECTORY, read_graph
 from placegraph.tools.map_files.trajectory_file import read_trajectory
 from placegraph.tools.simulator.ground_truth import FrameCounts, TrueLocation, Truth, read_truth
 from placegraph.tools.simulator.object_classes import CLASSES
@@ -44,12 +43,11 @@ def house_scores(folder: Path, source: Path, given: Mapping[int, F64] | None, qu
     Raises SourceError when `questions` are to be asked and the house has none, SchemaError for a damaged map.
     """
     truth = read_truth(source)
-    estimated, true = paired(read_trajectory(folder / TRAJECTORY), given)
-    true_from_map = level_alignment(estimated, true)
-    aligned_map = read_aligned_map(folder, true_from_map)
+    estimated, true = paired(positions_of(read_trajectory(folder / TRAJECTORY)), given)
+    true_from_map, graph = level_alignment(estimated, true), read_graph(folder)
+    aligned_map = align_folder(folder, graph, true_from_map)
     ground_truth = house_ground_truth(truth, truth.seen, true)
     scores = map_scores(aligned_map, ground_truth)
-    graph = SceneGraph.load(find_graph(folder))
     scores["place_names"] = place_name_scores(graph, aligned_map, truth)
     if truth.connections is not None:
         rooms = zip(truth.rooms, ground_truth.rooms or (), strict=True)

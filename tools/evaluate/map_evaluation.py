@@ -11,13 +11,20 @@ import numpy as np
 from placegraph.nodes.camera import detect_source
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.tools.evaluate.aligned_map import read_aligned_map
+from placegraph.tools.evaluate.aligned_map import align_folder
 from placegraph.tools.evaluate.house_truth import house_ground_truth, house_scores
 from placegraph.tools.evaluate.layer_scores import map_scores
-from placegraph.tools.evaluate.trajectory_error import at_times, level_alignment, paired, read_poses, trajectory_scores
+from placegraph.tools.evaluate.trajectory_error import (
+    at_times,
+    level_alignment,
+    paired,
+    positions_of,
+    trajectory_scores,
+)
 from placegraph.tools.evaluate.truth_file import read_truth_file, write_truth_file
 from placegraph.tools.evaluate.walk_quarters import walk_quarter_scores
-from placegraph.tools.map_files.map_folder import TRAJECTORY
+from placegraph.tools.map_files.map_folder import TRAJECTORY, read_graph
+from placegraph.tools.map_files.trajectory_file import read_trajectory
 from placegraph.tools.simulator.ground_truth import TRUTH, read_truth
 
 
@@ -28,7 +35,7 @@ def source_scores(folder: Path, source: Path, questions: bool = False) -> dict[s
     SchemaError for a damaged map.
     """
     given = detect_source(str(source))(source, {}).given_poses()
-    scores = trajectory_scores(read_poses(folder / TRAJECTORY), given)
+    scores = trajectory_scores(read_trajectory(folder / TRAJECTORY), given)
     if scores is None:
         raise SourceError(f"{source}: fewer than 3 given poses at the times of {folder / TRAJECTORY}")
     scores["poses_given"] = len(given or {})
@@ -39,15 +46,14 @@ def file_scores(folder: Path, truth_file: Path) -> dict[str, Any]:
     """A map against a truth file. Raises SourceError and SchemaError as `source_scores` does."""
     ground_truth = read_truth_file(truth_file)
     if ground_truth.trajectory is None:
-        return map_scores(read_aligned_map(folder, np.eye(4)), ground_truth)
-    estimated = read_poses(folder / TRAJECTORY)
+        return map_scores(align_folder(folder, read_graph(folder), np.eye(4)), ground_truth)
+    estimated = read_trajectory(folder / TRAJECTORY)
     given = at_times(estimated, ground_truth.trajectory)
     scores = trajectory_scores(estimated, given)
     if scores is None:
         raise SourceError(f"{truth_file}: trajectory: fewer than 3 poses at the times of {folder / TRAJECTORY}")
-    positions = {stamp: pose[:3, 3] for stamp, pose in estimated.items()}
-    aligned_map = read_aligned_map(folder, level_alignment(*paired(positions, given)))
-    return scores | map_scores(aligned_map, ground_truth)
+    true_from_map = level_alignment(*paired(positions_of(estimated), given))
+    return scores | map_scores(align_folder(folder, read_graph(folder), true_from_map), ground_truth)
 
 
 def quarter_scores(folder: Path, source: Path) -> dict[str, dict[str, Any]]:

@@ -18,11 +18,16 @@ from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.node import plugin
-from placegraph.tools.evaluate import box_average_precision, tag_average_precision
-from placegraph.tools.evaluate.box_average_precision import DetectedBoxes, TrueBoxes, mean_of_defined
 from placegraph.tools.evaluate.evaluation_views import evaluation_views
 from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY
-from placegraph.tools.evaluate.mask_iou import mask_overlaps
+from placegraph.tools.evaluate.network_metrics import (
+    DetectedBoxes,
+    TrueBoxes,
+    box_average_precisions,
+    mask_ious,
+    mean_of_defined,
+    tag_average_precisions,
+)
 from placegraph.tools.simulator.object_classes import CLASSES, NAMES
 from placegraph.tools.training.data_augmentation import Shard
 
@@ -103,21 +108,21 @@ def network_scores(shards: Sequence[Shard], networks: Networks) -> dict[str, Any
         whole.append(view.true_boxes(with_cut=False))
         with_cut.append(view.true_boxes(with_cut=True))
         masks = networks.segmenter.segment(view.color, view.depth_m, view.prompt_boxes)
-        ious.append(mask_overlaps(masks, view.prompt_masks()))
-    mask_ious = np.concatenate(ious)
-    synonyms = box_average_precision.average_precisions(by_synonym, whole, len(NAMES))
+        ious.append(mask_ious(masks, view.prompt_masks()))
+    all_ious = np.concatenate(ious)
+    synonyms = box_average_precisions(by_synonym, whole, len(NAMES))
     return _summary(
-        tag_average_precision.average_precisions(np.array(tag_rows), np.array(true_tags)),
-        box_average_precision.average_precisions(by_name, whole, len(NAMES)),
+        tag_average_precisions(np.array(tag_rows), np.array(true_tags)),
+        box_average_precisions(by_name, whole, len(NAMES)),
         np.where(HAS_UNTRAINED_SYNONYM, synonyms, np.nan),
-        box_average_precision.average_precisions(by_name, with_cut, len(NAMES)),
+        box_average_precisions(by_name, with_cut, len(NAMES)),
     ) | {
         "views": len(whole),
         "objects": sum(len(boxes.classes) for boxes in whole),
         "small": sum(int(boxes.ignored.sum()) for boxes in with_cut),
         "cut": sum(int((a.ignored & ~b.ignored).sum()) for a, b in zip(whole, with_cut, strict=True)),
-        "segmenter_miou": mean_of_defined(mask_ious),
-        "masks": int((~np.isnan(mask_ious)).sum()),
+        "segmenter_miou": mean_of_defined(all_ious),
+        "masks": int((~np.isnan(all_ious)).sum()),
     }
 
 

@@ -22,7 +22,7 @@ TIMED_VIEWS = 24  # after one that warms up
 THREADS = (1, 2)
 
 
-def networks(
+def evaluate_networks(
     houses: Annotated[int, typer.Option(min=1, help="Evaluation houses.")] = 20,
     views: Annotated[int, typer.Option(min=1, help="Views of each.")] = 24,
     tagger: Annotated[str, typer.Option(help="Weights of the tagger.")] = "house_tagger",
@@ -35,7 +35,10 @@ def networks(
     per_class: Annotated[bool, typer.Option("--per-class", help="Print average precisions by class.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Measure tagger, detector and segmenter on houses that no training has seen: precision, overlap, ms."""
+    """Measure the networks on simulated houses that no training has seen.
+
+    Average precision of tagger and detector, IoU of the segmenter, and ms of each.
+    """
     names = NetworkNames(tagger, detector, segmenter, tuple(model_dirs or ()))
     loaded = Networks.load_without_thresholds(names)  # a wrong name is noticed before minutes of rendering
     shards = evaluation_shards(houses, views, data)

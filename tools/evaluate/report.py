@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.tools.evaluate.box_average_precision import mean_of_defined
+from placegraph.tools.evaluate.network_metrics import mean_of_defined
 from placegraph.tools.evaluate.place_overlap import BOUNDARY_M
 
 
@@ -26,11 +26,13 @@ def plain(value: Any) -> Any:
     return value
 
 
-def table(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of equal length as aligned columns: the first to the left, the others to the right."""
+def table(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
+    """Rows of equal length as aligned columns: those in `left` to the left, the others to the right."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return "\n".join(
-        "  ".join(cell.rjust(w) if i else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True)))
+        "  ".join(
+            cell.ljust(w) if i in left else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+        )
         for row in rows
     )
 

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
 from placegraph.runtime.arrays import F64
-from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.vision.geometry import pose_from_quaternion
-from placegraph.tools.map_files.trajectory_file import read_trajectory
 
 RPE_M = 1.0  # of given path between the two poses of a pair
 MAX_TIME_DIFFERENCE_NS = 20_000_000  # between poses that belong together; 0.02 s as in the tools of TUM RGB-D
@@ -53,7 +49,7 @@ def trajectory_scores(estimated: Mapping[int, F64], given: Mapping[int, F64] | N
     estimated, given = (
         {stamp: pose for stamp, pose in poses.items() if np.isfinite(pose).all()} for poses in (estimated, given or {})
     )
-    scores = against_given({stamp: pose[:3, 3] for stamp, pose in estimated.items()}, given)
+    scores = against_given(positions_of(estimated), given)
     if scores is None:
         return None
     stamps = sorted(estimated.keys() & given.keys())
@@ -86,27 +82,17 @@ def relative_pose_error(estimated: F64, given: F64, length_m: float = RPE_M) -> 
     return float(np.sqrt((error_m**2).mean())), float(np.sqrt((error_deg**2).mean()))
 
 
-def read_poses(file: Path) -> dict[int, F64]:
-    """World_from_camera (4, 4) by stamp_ns of a map's trajectory.txt. Raises SchemaError naming the line."""
-    positions = read_trajectory(file)  # checks every line
-    rows = [line.split() for line in file.read_text("utf-8").splitlines() if line.strip() and line[0] != "#"]
-    if len(rows) != len(positions):
-        raise SchemaError(f"{file}: a time appears twice")
-    poses = {}
-    for (stamp_ns, xyz), row in zip(positions.items(), rows, strict=True):
-        quaternion = np.array(row[4:], float)
-        if not quaternion.any():
-            raise SchemaError(f"{file}: the pose at {row[0]} has the quaternion 0 0 0 0")
-        poses[stamp_ns] = pose_from_quaternion(xyz, quaternion)
-    return poses
-
-
 def at_times(stamps_ns: Mapping[int, object], given: Mapping[int, F64]) -> dict[int, F64]:
     """Given poses by the nearest of the stamps, none farther than MAX_TIME_DIFFERENCE_NS, each used once."""
     from placegraph.nodes.camera.tum import associate  # here: `placegraph` starts without the data sets
 
     wanted, available = (np.array(sorted(stamps), np.int64) for stamps in (stamps_ns, given))
     return {int(wanted[i]): given[int(available[j])] for i, j in associate(wanted, available, MAX_TIME_DIFFERENCE_NS)}
+
+
+def positions_of(poses: Mapping[int, F64]) -> dict[int, F64]:
+    """Positions (3,) by stamp_ns of poses (4, 4)."""
+    return {stamp: pose[:3, 3] for stamp, pose in poses.items()}
 
 
 def paired(estimated: Mapping[int, F64], given: Mapping[int, F64] | None) -> tuple[F64, F64]:

@@ -13,7 +13,7 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.scene_graph import SceneGraph
 from placegraph.tools.export import dsg, glb, ros, svg
 from placegraph.tools.export import ply as clouds
-from placegraph.tools.map_files.map_folder import find_graph
+from placegraph.tools.map_files.map_folder import read_graph
 
 
 class Format(StrEnum):
@@ -40,8 +40,11 @@ def export(
     kind: Annotated[Format, typer.Argument(metavar="dsg|svg|glb|ply|ros")],
     out: Annotated[Path, typer.Option(help="File to write; for ply and ros a folder.")],
 ) -> None:
-    """Write a map for others: spark_dsg (Hydra) JSON, SVG floor plans, a GLB scene, PLY points, ROS occupancy maps."""
-    graph = SceneGraph.load(find_graph(map_folder))
+    """Write a map in a format of other systems.
+
+    dsg: JSON of spark_dsg (Hydra); svg: floor plans; glb: a 3D scene; ply: points of each node; ros: occupancy maps.
+    """
+    graph = read_graph(map_folder)
     try:
         for path in WRITERS[kind](map_folder, graph, out):
             print(path)

@@ -34,6 +34,11 @@ PACKAGES = (
 )
 
 
+def read_graph(path: Path) -> SceneGraph:
+    """The graph of a map folder, or in a graph file; raises SchemaError."""
+    return SceneGraph.load(find_graph(path))
+
+
 def write_map(folder: Path, map_: Map | None, graph: Graph | NamedGraph | None) -> None:
     """Write the clouds, the retired objects and the graph into a folder; what is None is left out."""
     if map_ is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Pose
-from placegraph.runtime.vision.geometry import quaternion_xyzw
+from placegraph.runtime.vision.geometry import pose_from_quaternion, quaternion_xyzw
 
 
 def write_trajectory(path: Path, poses: list[Pose]) -> None:
@@ -24,24 +24,27 @@ def write_trajectory(path: Path, poses: list[Pose]) -> None:
 
 
 def read_trajectory(path: Path) -> dict[int, F64]:
-    """TUM file to stamp_ns -> (3,) position in metres; raises SchemaError naming the line."""
-    positions: dict[int, F64] = {}
+    """World_from_camera (4, 4) in metres by stamp_ns of a TUM file; raises SchemaError naming the line."""
+    poses: dict[int, F64] = {}
     try:
         text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise SchemaError(f"{path}: cannot read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise SchemaError(f"{path}: cannot read: {error}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise SchemaError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}") from None
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):
             continue
         try:
-            stamp, *numbers = line.split()
+            stamp, *words = line.split()
             seconds, _, fraction = stamp.partition(".")
-            position = np.array(numbers, float)
-            if position.shape != (7,) or not np.isfinite(position).all():
+            stamp_ns = int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
+            numbers = np.array(words, float)
+            if numbers.shape != (7,) or not np.isfinite(numbers).all():
                 raise ValueError("expected 8 finite numbers")
-            positions[int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)] = position[:3]
+            if not numbers[3:].any():
+                raise ValueError("the quaternion is 0 0 0 0")
+            if stamp_ns in poses:
+                raise ValueError("a time appears twice")
         except ValueError as error:
             raise SchemaError(f"{path}:{number}: {error}") from None
-    return positions
+        poses[stamp_ns] = pose_from_quaternion(numbers[:3], numbers[3:])
+    return poses

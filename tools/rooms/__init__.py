@@ -17,7 +17,7 @@ from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.nodes.hierarchy.rooms import RoomArea, RoomConfig, keep_walls, room_areas, segment_rooms
 from placegraph.runtime.arrays import Bool
 from placegraph.runtime.errors import ConfigError, SourceError
-from placegraph.tools.rooms.point_cloud import FloorRooms, floors_of_cloud, read_point_cloud
+from placegraph.tools.rooms.point_cloud import floors_of_cloud, read_point_cloud
 
 MAX_ROOMS = np.iinfo(np.uint16).max
 
@@ -60,14 +60,15 @@ def rooms(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON with the outlines in metres.")] = False,
 ) -> None:
-    """Split an occupancy map (PNG, PGM, ROS's YAML), or a point cloud's floors (PLY), into rooms as label images."""
+    """Split an occupancy map or a point cloud of another system into rooms.
+
+    Reads a map as PNG, PGM or ROS's YAML and a cloud as PLY; writes a label image for each floor.
+    """
     if source.suffix.lower() == ".ply":
-        floors = [_floor_row(*floor) for floor in _write_floors(source, out, resolution)]
+        floors = _write_floors(source, out, resolution)
         print(json.dumps({"floors": floors}, sort_keys=True) if as_json else "\n".join(map(_floor_text, floors)))
         return
-    grid, areas = rooms_of_plan(read_map(source, resolution))
-    _write_labels(out, source, grid, areas)
-    rows = [_row(number, area, grid.cell_m) for number, area in enumerate(areas, 1)]
+    rows = _write_labels(out, source, *rooms_of_plan(read_map(source, resolution)))
     print(json.dumps({"rooms": rows}, sort_keys=True) if as_json else _text(rows, out))
 
 
@@ -120,51 +121,41 @@ def _read_yaml(path: Path) -> MapYaml:
         raise SourceError(f"{path}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}") from None
 
 
-def _write_floors(source: Path, out: Path, resolution: float | None) -> list[tuple[int, FloorRooms, Path]]:
-    """Label images of a cloud's floors: (number from the lowest, floor, file)."""
+def _write_floors(source: Path, out: Path, resolution: float | None) -> list[dict[str, Any]]:
+    """Write the label images of a cloud's floors; returns a row for each floor, the lowest first."""
     floors = floors_of_cloud(read_point_cloud(source), RoomConfig().cell_m if resolution is None else resolution)
-    written = []
+    rows = []
     for number, floor in enumerate(floors, 1):
         file = out if len(floors) == 1 else out.with_name(f"{out.stem}-{number}{out.suffix}")
-        _write_labels(file, source, floor.grid, floor.rooms)
-        written.append((number, floor, file))
-    return written
+        row = {
+            "floor": number,
+            "low_m": round(floor.span.low, 3),
+            "high_m": round(floor.span.ceiling, 3),
+            "labels": str(file),
+            "origin_m": np.round(floor.grid.origin, 3).tolist(),  # of the image's lower left corner
+            "cell_m": floor.grid.cell_m,
+        }
+        rows.append(row | {"rooms": _write_labels(file, source, floor.grid, floor.rooms)})
+    return rows
 
 
-def _write_labels(out: Path, source: Path, grid: PlanGrid, areas: list[RoomArea]) -> None:
+def _write_labels(out: Path, source: Path, grid: PlanGrid, areas: list[RoomArea]) -> list[dict[str, Any]]:
+    """Write the label image of one plan; returns a row for each room."""
     if len(areas) > MAX_ROOMS:
         raise SourceError(f"{source}: {len(areas)} rooms do not fit a 16 bit image")
-    labels = np.zeros(grid.shape, np.uint16)
+    labels, rows = np.zeros(grid.shape, np.uint16), []
     for number, room in enumerate(areas, 1):
         labels[room.mask] = number
+        area_m2 = round(float(room.mask.sum()) * grid.cell_m**2, 2)
+        rows.append({"room": number, "area_m2": area_m2, "outline_m": np.round(room.outline, 3).tolist()})
     if out.suffix.lower() != ".png" or not cv2.imwrite(str(out), labels[::-1]):
         raise ConfigError(f"--out {out}: cannot write a picture there; is it a .png in a folder that exists?")
-
-
-def _floor_row(number: int, floor: FloorRooms, file: Path) -> dict[str, Any]:
-    grid = floor.grid
-    return {
-        "floor": number,
-        "low_m": round(floor.span.low, 3),
-        "high_m": round(floor.span.ceiling, 3),
-        "labels": str(file),
-        "origin_m": np.round(grid.origin, 3).tolist(),  # of the image's lower left corner
-        "cell_m": grid.cell_m,
-        "rooms": [_row(k, room, grid.cell_m) for k, room in enumerate(floor.rooms, 1)],
-    }
+    return rows
 
 
 def _floor_text(row: dict[str, Any]) -> str:
     heights = f"floor {row['floor']} from {row['low_m']:.2f} to {row['high_m']:.2f} m"
     return f"{heights}\n{_text(row['rooms'], Path(row['labels']))}"
-
-
-def _row(number: int, room: RoomArea, cell_m: float) -> dict[str, Any]:
-    return {
-        "room": number,
-        "area_m2": round(float(room.mask.sum()) * cell_m**2, 2),
-        "outline_m": np.round(room.outline, 3).tolist(),
-    }
 
 
 def _text(rows: list[dict[str, Any]], out: Path) -> str:

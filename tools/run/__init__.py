@@ -20,7 +20,7 @@ from placegraph.runtime.health import StepStats
 from placegraph.runtime.inline import Inline
 from placegraph.runtime.launcher import Launcher
 from placegraph.runtime.messages import Correction, End, Frame, Health, Keyframe, Map, Message, Pose
-from placegraph.tools.evaluate import against_given
+from placegraph.tools.evaluate.trajectory_error import against_given
 from placegraph.tools.map_files.map_folder import GRAPH, make_empty_folder, next_folder, write_run
 from placegraph.tools.run.map_collector import MapCollector
 from placegraph.tools.run.progress_table import ProgressTable

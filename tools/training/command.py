@@ -10,7 +10,7 @@ import typer
 from placegraph.runtime.errors import ConfigError
 
 app = typer.Typer(
-    help="Train the embedded networks on procedural houses (extra `train`); every step goes on where it was stopped.",
+    help="Train the embedded networks on simulated houses (extra `train`).\n\nEvery step goes on where it was stopped.",
     no_args_is_help=True,
 )
 Data = Annotated[Path, typer.Option(help="Folder of the rendered views.")]

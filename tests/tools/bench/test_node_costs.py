@@ -81,7 +81,7 @@ def test_the_queue_that_the_bus_is_compared_with_leaves_no_thread_behind(quick):
 
 
 def test_the_table_is_aligned():
-    text = tool.table([Cost("short", 1.0, "one", 2.0), Cost("a longer part", 100.0, "another", 50.0)])
+    text = tool.cost_table([Cost("short", 1.0, "one", 2.0), Cost("a longer part", 100.0, "another", 50.0)])
     header, first, second = text.splitlines()
     assert header.split() == ["part", "ms", "baseline", "ms", "ratio"]
     assert first.endswith("0.50") and second.endswith("2.00")
@@ -90,9 +90,9 @@ def test_the_table_is_aligned():
 
 def test_it_prints_a_table_or_json(capsys, monkeypatch):
     monkeypatch.setattr(command, "measure", lambda: [Cost("a", 3.0, "b", 2.0)])
-    command.bench()
+    command.bench_nodes()
     assert capsys.readouterr().out.splitlines()[1].split() == ["a", "3.000", "b", "2.000", "1.50"]
-    command.bench(as_json=True)
+    command.bench_nodes(as_json=True)
     expected = {"part": "a", "ms": 3.0, "baseline": "b", "baseline_ms": 2.0, "ratio": 1.5}
     assert json.loads(capsys.readouterr().out) == [expected]
 

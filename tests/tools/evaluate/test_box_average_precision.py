@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from placegraph.tools.evaluate.box_average_precision import (
+from placegraph.tools.evaluate.network_metrics import (
     DetectedBoxes,
     TrueBoxes,
-    average_precisions,
+    box_average_precisions,
     box_ious,
     mean_of_defined,
 )
@@ -27,11 +27,11 @@ def true(*rows):
 
 
 def ap(detected_boxes, true_boxes, **settings):
-    return average_precisions([detected_boxes], [true_boxes], 1, **settings)[0]
+    return box_average_precisions([detected_boxes], [true_boxes], 1, **settings)[0]
 
 
 def test_nothing_to_find_is_unknown_and_nothing_found_is_zero() -> None:
-    assert np.isnan(average_precisions([], [], 3)).all()
+    assert np.isnan(box_average_precisions([], [], 3)).all()
     assert np.isnan(ap(found((A, 0, 0.9)), true()))
     assert np.isnan(ap(found((A, 0, 0.9)), true((A, 0, True))))
     assert ap(found(), true((A, 0))) == 0
@@ -93,7 +93,7 @@ def test_classes_and_images_are_apart() -> None:
     finds = [found((A, 0, 0.9), (B, 1, 0.8)), found((A, 0, 0.95))]
     truth = [true((A, 0), (B, 0)), true((A, 1))]
     # class 0: wrong (second image), right, of 2; class 1: wrong, of 1; class 2 does not occur
-    values = average_precisions(finds, truth, 3)
+    values = box_average_precisions(finds, truth, 3)
     assert values[:2] == pytest.approx([51 * 0.5 / 101, 0]) and np.isnan(values[2])
     assert mean_of_defined(values) == pytest.approx(51 * 0.25 / 101)
     assert np.isnan(mean_of_defined(np.array([np.nan])))

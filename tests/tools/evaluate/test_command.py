@@ -15,5 +15,5 @@ import pytest
     ],
 )
 def test_options_that_do_not_fit_are_refused(cli, arguments, reason, tmp_path) -> None:
-    done = cli("evaluate", "MAP", *arguments)
+    done = cli("evaluate", "map", "MAP", *arguments)
     assert done.code == 2 and reason in done.reason

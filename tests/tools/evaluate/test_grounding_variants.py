@@ -61,13 +61,13 @@ def test_each_variant_answers(scene) -> None:
 def test_wrong_arguments_are_named(cli) -> None:
     with pytest.raises(ConfigError, match="magic"):
         chosen_variants("program,magic")
-    assert cli("evaluate-grounding").code == 2
-    assert cli("evaluate-grounding", "--houses", "9-2").code == 2
-    assert cli("evaluate-grounding", "--houses", "x").code == 2
-    assert cli("evaluate-grounding", "some-map").code == 2
+    assert cli("evaluate", "grounding").code == 2
+    assert cli("evaluate", "grounding", "--houses", "9-2").code == 2
+    assert cli("evaluate", "grounding", "--houses", "x").code == 2
+    assert cli("evaluate", "grounding", "some-map").code == 2
 
 
 def test_the_command_prints_a_table_or_json(cli) -> None:
-    asked = ("evaluate-grounding", "--houses", "9100", "--count", 3, "--variants", "oracle,rules")
+    asked = ("evaluate", "grounding", "--houses", "9100", "--count", 3, "--variants", "oracle,rules")
     assert "exact id" in cli(*asked, "--forms").out
     assert set(json.loads(cli(*asked, "--json").out)) == {"oracle", "rules"}

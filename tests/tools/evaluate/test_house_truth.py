@@ -10,9 +10,9 @@ from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import inverse, transform
-from placegraph.tools.evaluate.aligned_map import read_aligned_map
+from placegraph.tools.evaluate.aligned_map import align_folder
 from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY, MIN_FRAMES, house_ground_truth, visibility_of
-from placegraph.tools.map_files.map_folder import read_object_clouds
+from placegraph.tools.map_files.map_folder import read_graph, read_object_clouds
 from placegraph.tools.map_files.ply import write_points
 from placegraph.tools.map_files.trajectory_file import write_trajectory
 from placegraph.tools.simulator.ground_truth import FrameCounts, read_truth, truth_of, write_truth
@@ -95,7 +95,7 @@ def perfect(source, tmp_path):
 
 
 def test_boxes_are_made_anew_from_the_clouds(perfect, source) -> None:
-    aligned_map = read_aligned_map(perfect, inverse(MAP_FROM_TRUE))
+    aligned_map = align_folder(perfect, read_graph(perfect), inverse(MAP_FROM_TRUE))
     truth = read_truth(source)
     by_id = {one.id: one for one in aligned_map.objects}
     for one in truth.objects:
@@ -113,18 +113,18 @@ def test_damaged_clouds_are_named(perfect) -> None:
             read_object_clouds(perfect)
     file.unlink()
     with pytest.raises(SchemaError, match=r"objects\.ply: cannot read"):
-        read_aligned_map(perfect, np.eye(4))
+        align_folder(perfect, read_graph(perfect), np.eye(4))
 
 
 def test_clouds_of_another_run_are_noticed(perfect) -> None:
     write_points(perfect / "objects.ply", np.zeros((0, 3)), {"object": np.zeros(0, np.int32)})
     assert read_object_clouds(perfect) == {}
     with pytest.raises(SchemaError, match="no points of O0"):
-        read_aligned_map(perfect, np.eye(4))
+        align_folder(perfect, read_graph(perfect), np.eye(4))
 
 
 def test_a_perfect_map_is_perfect_wherever_it_starts(cli, perfect, source) -> None:
-    done = cli("evaluate", perfect, "--source", source, "--json")
+    done = cli("evaluate", "map", perfect, "--source", source, "--json")
     assert done.code == 0, done.err
     found = json.loads(done.out)
     truth = read_truth(source)
@@ -149,18 +149,18 @@ def test_what_a_map_lacks_is_missed(cli, source, tmp_path) -> None:
     half = truth.objects[: len(truth.objects) // 2]
     renamed = [replace(half[0], class_name="guitar" if half[0].class_name != "guitar" else "piano"), *half[1:]]
     folder = write_map(source, tmp_path / "map", renamed)
-    things = json.loads(cli("evaluate", folder, "--source", source, "--json").out)["objects"]
+    things = json.loads(cli("evaluate", "map", folder, "--source", source, "--json").out)["objects"]
     assert things["found"] == len(half) - 1 and things["map"] == len(half)
     assert things["precision"] == pytest.approx((len(half) - 1) / len(half), abs=1e-4)
 
 
 def test_the_command_in_words_with_the_table(cli, perfect, source) -> None:
-    done = cli("evaluate", perfect, "--source", source, "--per-class")
+    done = cli("evaluate", "map", perfect, "--source", source, "--per-class")
     lines = done.out.splitlines()
     assert [line.split()[0] for line in lines[:6]] == ["ATE", "floors", "rooms", "locations", "objects", "names"]
     assert "recall 1.000, precision 1.000" in lines[4]
     assert any(line.split()[:1] == ["class"] for line in lines)
-    assert "class  " not in cli("evaluate", perfect, "--source", source).out
+    assert "class  " not in cli("evaluate", "map", perfect, "--source", source).out
 
 
 def test_questions_are_asked_and_scored(cli, perfect, source, tmp_path) -> None:
@@ -171,15 +171,17 @@ def test_questions_are_asked_and_scored(cli, perfect, source, tmp_path) -> None:
         HouseQuestion(f"find the {single.class_name}", single.id, single.box, "name", (), single.room, 0),
         HouseQuestion("find the submarine", 0, truth.objects[0].box, "none", (), 0, 0),
     ]
-    absent = cli("evaluate", perfect, "--source", source, "--questions")
+    absent = cli("evaluate", "map", perfect, "--source", source, "--questions")
     assert absent.code == 1 and absent.reason.endswith("no questions in truth/questions.json")
     settings = {"grounding": {"use_model": False}}
     (perfect / "run.json").write_text(json.dumps({"config": {"run": {}, "nodes": settings}}))
     file = source / "truth" / "questions.json"
     file.write_text(json.dumps(to_json(asked)))
     try:
-        found = json.loads(cli("evaluate", perfect, "--source", source, "--questions", "--json").out)["questions"]
-        words = cli("evaluate", perfect, "--source", source, "--questions").out
+        found = json.loads(cli("evaluate", "map", perfect, "--source", source, "--questions", "--json").out)[
+            "questions"
+        ]
+        words = cli("evaluate", "map", perfect, "--source", source, "--questions").out
     finally:
         file.unlink()
     assert (found["forms"]["name"]["acc_0.75"], found["forms"]["none"]["acc_0.1"]) == (1, 0)
@@ -192,11 +194,11 @@ def test_without_truth_the_house_options_are_refused(cli, perfect, source, tmp_p
     bare.mkdir()
     for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
         (bare / name).symlink_to(source / name)
-    assert set(json.loads(cli("evaluate", perfect, "--source", bare, "--json").out)) == {
+    assert set(json.loads(cli("evaluate", "map", perfect, "--source", bare, "--json").out)) == {
         "ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg", "poses_given",
     }  # fmt: skip
-    assert cli("evaluate", perfect, "--source", bare).out.startswith("ATE rmse 0.0 m")
-    refused = cli("evaluate", perfect, "--source", bare, "--questions")
+    assert cli("evaluate", "map", perfect, "--source", bare).out.startswith("ATE rmse 0.0 m")
+    refused = cli("evaluate", "map", perfect, "--source", bare, "--questions")
     assert refused.code == 2 and "need a house with its truth" in refused.reason
 
 
@@ -234,8 +236,8 @@ def test_what_the_walk_did_not_show_is_not_asked_for(source) -> None:
 
 def test_the_truth_of_a_house_as_a_file_gives_the_same_scores(cli, perfect, source, tmp_path) -> None:
     file = tmp_path / "truth.json"
-    by_source = json.loads(cli("evaluate", perfect, "--source", source, "--write-truth", file, "--json").out)
-    done = cli("evaluate", perfect, "--against", file, "--json")
+    by_source = json.loads(cli("evaluate", "map", perfect, "--source", source, "--write-truth", file, "--json").out)
+    done = cli("evaluate", "map", perfect, "--against", file, "--json")
     assert done.code == 0, done.err
     by_file = json.loads(done.out)
     assert by_source.pop("poses_given") == 4
@@ -256,9 +258,9 @@ def test_a_truth_file_with_parts_left_out(cli, perfect, source, tmp_path) -> Non
     boxes = [transform(MAP_FROM_TRUE, corners(one.box)) for one in truth.objects]
     objects = [{"name": o.class_name, "box": extent(b).tolist()} for o, b in zip(truth.objects, boxes, strict=True)]
     file.write_text(json.dumps({"version": 1, "objects": objects}))  # in the map's frame: no trajectory to lay it by
-    found = json.loads(cli("evaluate", perfect, "--against", file, "--json").out)
+    found = json.loads(cli("evaluate", "map", perfect, "--against", file, "--json").out)
     assert set(found) == {"objects"} and (found["objects"]["recall"], found["objects"]["precision"]) == (1, 1)
-    lines = cli("evaluate", perfect, "--against", file).out.splitlines()
+    lines = cli("evaluate", "map", perfect, "--against", file).out.splitlines()
     assert [line.split()[0] for line in lines] == ["objects", "names", "floors", "rooms", "locations", "trajectory"]
     assert all("not in the truth: not scored" in line for line in lines[2:])
 
@@ -267,7 +269,7 @@ def test_several_maps_are_one_table_with_means(cli, source, tmp_path) -> None:
     truth = read_truth(source)
     whole = write_map(source, tmp_path / "whole")
     half = write_map(source, tmp_path / "half", truth.objects[: len(truth.objects) // 2])
-    two = ("evaluate", whole, half, "--source", source, "--source", source)
+    two = ("evaluate", "map", whole, half, "--source", source, "--source", source)
     found = json.loads(cli(*two, "--json").out)
     assert found["maps"][str(whole)]["objects"]["recall"] == 1
     recall = found["maps"][str(half)]["objects"]["recall"]
@@ -277,7 +279,7 @@ def test_several_maps_are_one_table_with_means(cli, source, tmp_path) -> None:
     file = tmp_path / "rooms.json"
     polygon = into_map(truth.rooms[0].polygon).tolist()
     file.write_text(json.dumps({"version": 1, "rooms": [{"polygon": polygon}]}))
-    head = cli("evaluate", whole, half, "--against", file, "--against", file).out.splitlines()[0]
+    head = cli("evaluate", "map", whole, half, "--against", file, "--against", file).out.splitlines()[0]
     assert "room F1" in head and "obj P" not in head and "ATE" not in head
 
 
@@ -285,7 +287,7 @@ def test_only_a_house_has_quarters_and_a_truth_to_write(cli, perfect, source, tm
     for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
         (tmp_path / name).symlink_to(source / name)
     for option in (("--progress",), ("--write-truth", tmp_path / "t.json")):
-        done = cli("evaluate", perfect, "--source", tmp_path, *option)
+        done = cli("evaluate", "map", perfect, "--source", tmp_path, *option)
         assert done.code == 2 and f"{option[0]} needs a house with its truth" in done.reason
 
 
@@ -294,7 +296,7 @@ def test_a_house_of_which_nothing_was_seen_can_be_told(cli, perfect, source, tmp
     for name in ("rgb.txt", "depth.txt", "groundtruth.txt", "calibration.txt", "rgb", "depth"):
         (tmp_path / name).symlink_to(source / name)
     write_truth(replace(truth, seen=tuple(FrameCounts(one.id, 0, 0) for one in truth.objects)), tmp_path)
-    found = json.loads(cli("evaluate", perfect, "--source", tmp_path, "--json").out)
+    found = json.loads(cli("evaluate", "map", perfect, "--source", tmp_path, "--json").out)
     assert (found["objects"]["truth"], found["objects"]["recall"], found["locations"]["truth"]) == (0, None, 0)
     assert 0 < found["rooms"]["truth"] < found["rooms"]["of"]  # those that were walked through
-    assert cli("evaluate", perfect, "--source", tmp_path).code == 0
+    assert cli("evaluate", "map", perfect, "--source", tmp_path).code == 0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from placegraph.tools.evaluate.mask_iou import mask_overlaps
+from placegraph.tools.evaluate.network_metrics import mask_ious
 
 
 def mask(*cells):
@@ -11,15 +11,15 @@ def mask(*cells):
 
 
 def test_no_masks() -> None:
-    assert mask_overlaps([], []).shape == (0,)
+    assert mask_ious([], []).shape == (0,)
 
 
 def test_by_hand() -> None:
     found = [mask(0, 1, 2), mask(5), mask(), mask(), mask(7)]
     true = [mask(1, 2, 3), mask(5), mask(), mask(1), mask()]
-    assert mask_overlaps(found, true) == pytest.approx([0.5, 1, np.nan, 0, 0], nan_ok=True)
+    assert mask_ious(found, true) == pytest.approx([0.5, 1, np.nan, 0, 0], nan_ok=True)
 
 
 def test_lists_of_different_lengths_are_a_bug() -> None:
     with pytest.raises(ValueError):
-        mask_overlaps([mask()], [])
+        mask_ious([mask()], [])

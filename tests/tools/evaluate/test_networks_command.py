@@ -21,7 +21,7 @@ from placegraph.tools.evaluate.network_scores import (
     network_scores,
     tag_scores,
 )
-from placegraph.tools.evaluate.networks_command import network_times, networks
+from placegraph.tools.evaluate.networks_command import evaluate_networks, network_times
 from placegraph.tools.simulator.object_classes import CLASSES, NAMES
 from placegraph.tools.training.data_augmentation import MIN_SHARE
 from placegraph.tools.training.view_rendering import EVALUATION_SEEDS, visible_boxes
@@ -203,7 +203,7 @@ def test_an_unknown_name_is_noticed_before_anything_is_rendered(tmp_path, models
         "placegraph.tools.evaluate.networks_command.evaluation_shards", lambda *_: pytest.fail("rendered")
     )
     with pytest.raises(ModelError, match="no weights named 'absent'"):
-        networks(tagger="absent", data=tmp_path)
+        evaluate_networks(tagger="absent", data=tmp_path)
 
 
 @pytest.fixture
@@ -212,7 +212,7 @@ def command(data, models):
     from typer.testing import CliRunner
 
     app = typer.Typer()
-    app.command("evaluate-networks")(networks)
+    app.command("networks")(evaluate_networks)
     names = ["--tagger", "tiny_ram", "--detector", "tiny_boxes", "--segmenter", "tiny_sam"]
     where = ["--model-dir", str(models), "--data", str(data), "--houses", "2", "--views", "2"]
 

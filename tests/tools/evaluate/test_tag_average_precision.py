@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from placegraph.tools.evaluate.tag_average_precision import average_precisions
+from placegraph.tools.evaluate.network_metrics import tag_average_precisions
 
 NAN = np.nan
 
 
 def ap(scores, true):
-    return average_precisions(np.array(scores, float)[:, None], np.array(true, float)[:, None])[0]
+    return tag_average_precisions(np.array(scores, float)[:, None], np.array(true, float)[:, None])[0]
 
 
 @pytest.mark.parametrize("true", [[0, 0], [NAN, NAN], [0, NAN]])
@@ -33,4 +33,4 @@ def test_equal_scores_count_at_once_in_any_order() -> None:
 
 def test_classes_are_apart() -> None:
     scores = np.array([[0.9, 0.1], [0.1, 0.9]])
-    assert average_precisions(scores, np.array([[1.0, 1], [0, 0]])) == pytest.approx([1, 0.5])
+    assert tag_average_precisions(scores, np.array([[1.0, 1], [0, 0]])) == pytest.approx([1, 0.5])

@@ -6,14 +6,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from placegraph.nodes.camera import detect_source
-from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Pose
 from placegraph.runtime.vision.geometry import inverse, transform
-from placegraph.tools.evaluate import absolute_trajectory_error, against_given
 from placegraph.tools.evaluate.trajectory_error import (
+    absolute_trajectory_error,
+    against_given,
     at_times,
     level_alignment,
-    read_poses,
     relative_pose_error,
     trajectory_scores,
 )
@@ -129,22 +128,6 @@ def test_times_of_another_clock_reading_are_matched_by_nearness() -> None:
     assert at_times({}, given) == {} and at_times({0: None}, {}) == {}
 
 
-def test_poses_of_a_file_are_checked(tmp_path) -> None:
-    file = tmp_path / "trajectory.txt"
-    file.write_text("# none\n")
-    assert read_poses(file) == {}
-    file.write_text("# one\n1.5 1 2 3 0 0 1 0\n")
-    assert read_poses(file)[1_500_000_000][:3] == pytest.approx(
-        np.array([[-1, 0, 0, 1], [0, -1, 0, 2], [0, 0, 1, 3.0]])
-    )
-    file.write_text("1.5 1 2 3 0 0 1 0\n1.5 1 2 3 0 0 1 0\n")
-    with pytest.raises(SchemaError, match="a time appears twice"):
-        read_poses(file)
-    file.write_text("1.5 1 2 3 0 0 0 0\n")
-    with pytest.raises(SchemaError, match=r"the pose at 1\.5 has the quaternion 0 0 0 0"):
-        read_poses(file)
-
-
 def test_the_level_alignment_undoes_a_turn_about_z_and_nothing_else() -> None:
     walk = np.random.default_rng(0).normal(size=(30, 3))
     found = level_alignment(transform(MOTION, walk), walk)
@@ -193,7 +176,7 @@ def track(tmp_path, seven):
 
 
 def test_the_command_on_a_moved_copy(cli, track, seven) -> None:
-    done = cli("evaluate", track(), "--source", seven, "--json")
+    done = cli("evaluate", "map", track(), "--source", seven, "--json")
     assert done.code == 0 and done.err == ""
     found = json.loads(done.out)
     assert set(found) == {"ate_rmse_m", "ate_max_m", "poses", "path_m", "ate_share", "rpe_m", "rpe_deg", "poses_given"}
@@ -201,22 +184,23 @@ def test_the_command_on_a_moved_copy(cli, track, seven) -> None:
 
 
 def test_the_command_in_words(cli, track, seven) -> None:
-    done = cli("evaluate", track(0.3), "--source", seven)
+    done = cli("evaluate", "map", track(0.3), "--source", seven)
     assert done.out.startswith("ATE rmse 0.") and " m of path: " in done.out and "rmse 0.0 m" not in done.out
 
 
 def test_errors_name_the_file(cli, track, seven, tmp_path) -> None:
     folder = track()
-    absent = cli("evaluate", tmp_path / "no", "--source", seven)
+    absent = cli("evaluate", "map", tmp_path / "no", "--source", seven)
     assert (absent.code, absent.reason) == (
         1,
         f"{tmp_path / 'no' / 'trajectory.txt'}: cannot read: No such file or directory",
     )
-    source = cli("evaluate", folder, "--source", tmp_path / "no")
+    source = cli("evaluate", "map", folder, "--source", tmp_path / "no")
     assert (source.code, source.reason) == (1, f"{tmp_path / 'no'}: no such file or folder")
     (folder / "trajectory.txt").write_text("# nothing\n")
-    assert "fewer than 3 given poses at the times of" in cli("evaluate", folder, "--source", seven).reason
+    assert "fewer than 3 given poses at the times of" in cli("evaluate", "map", folder, "--source", seven).reason
     (folder / "trajectory.txt").write_text("# two\n0.0 1 2 3\n")
     assert (
-        cli("evaluate", folder, "--source", seven).reason == f"{folder / 'trajectory.txt'}:2: expected 8 finite numbers"
+        cli("evaluate", "map", folder, "--source", seven).reason
+        == f"{folder / 'trajectory.txt'}:2: expected 8 finite numbers"
     )

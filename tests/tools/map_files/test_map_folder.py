@@ -20,7 +20,6 @@ from placegraph.tools.map_files.map_folder import (
     write_run,
 )
 from placegraph.tools.map_files.ply import write_points
-from placegraph.tools.map_files.trajectory_file import read_trajectory, write_trajectory
 from placegraph.tools.run.map_collector import MapCollector
 
 START = {"camera": {"source": "flat"}, "pose": {"method": "given"}, "keyframe": {}}
@@ -53,44 +52,6 @@ def graph(*, final):
 
 def named_graph(*, final):
     return NamedGraph(frame_id=0, stamp_ns=0, revision=0, final=final, place_types=(), json="{}")
-
-
-def test_a_trajectory_holds_trusted_poses_by_time(tmp_path) -> None:
-    path = tmp_path / "trajectory.txt"
-    write_trajectory(path, [pose(2), pose(0), pose(1, trusted=False), pose(3, stamp_ns=1341841278_842_900_123)])
-    assert (
-        path.read_text().splitlines()[1]
-        == "0.000000000 0.000000 -0.500000 0.000000 0.000000 0.000000 0.000000 1.000000"
-    )
-    found = read_trajectory(path)
-    assert list(found) == [0, 2 * 10**8, 1341841278_842_900_123]  # a time since 1970 to the nanosecond
-    assert found[2 * 10**8].tolist() == [2.0, -0.5, 0.0]
-
-
-def test_a_trajectory_of_nothing(tmp_path) -> None:
-    write_trajectory(tmp_path / "t.txt", [])
-    assert (tmp_path / "t.txt").read_text() == "# seconds tx ty tz qx qy qz qw\n"
-    assert read_trajectory(tmp_path / "t.txt") == {}
-
-
-def test_short_and_long_fractions_of_a_second(tmp_path) -> None:
-    (tmp_path / "t.txt").write_text("\n1 0 0 0 0 0 0 1\n1.5 0 0 0 0 0 0 1\n1.0000000019 0 0 0 0 0 0 1\n")
-    assert list(read_trajectory(tmp_path / "t.txt")) == [10**9, 15 * 10**8, 10**9 + 1]
-
-
-@pytest.mark.parametrize("line", ["1.0", "1.0 1 2 3", "x 0 0 0 0 0 0 1", "1.0 nan 0 0 0 0 0 1", "1.0 a 0 0 0 0 0 1"])
-def test_a_broken_line_is_named(tmp_path, line) -> None:
-    (tmp_path / "t.txt").write_text(f"# fine\n0.0 0 0 0 0 0 0 1\n{line}\n")
-    with pytest.raises(SchemaError, match=r"t\.txt:3: "):
-        read_trajectory(tmp_path / "t.txt")
-
-
-def test_a_trajectory_that_cannot_be_read(tmp_path) -> None:
-    with pytest.raises(SchemaError, match=r"t\.txt: cannot read: No such file or directory"):
-        read_trajectory(tmp_path / "t.txt")
-    (tmp_path / "t.txt").write_bytes(b"\xff\xfe")
-    with pytest.raises(SchemaError, match=r"t\.txt: cannot read: 'utf-8'"):
-        read_trajectory(tmp_path / "t.txt")
 
 
 def test_prepare_makes_or_takes_an_empty_folder_only(tmp_path) -> None:

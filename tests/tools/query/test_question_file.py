@@ -156,8 +156,8 @@ def test_what_was_answered_is_kept_when_it_is_killed(tmp_path, mapped) -> None:
     questions, out = tmp_path / "q.jsonl", tmp_path / "a.jsonl"
     questions.write_text("".join(json.dumps({"id": n, "text": "a chair"}) + "\n" for n in range(100_000)))
     out.write_text("older answers\n")
-    command = [sys.executable, "-m", "placegraph.tools.cli", "ask", "--graph", str(mapped), "--mode", "rules"]
-    asking = subprocess.Popen([*command, "--batch", str(questions), "--out", str(out)], env=os.environ)
+    command = [sys.executable, "-m", "placegraph.tools.cli", "ask-batch", str(questions), "--out", str(out)]
+    asking = subprocess.Popen([*command, "--graph", str(mapped), "--mode", "rules"], env=os.environ)
     partial, deadline = tmp_path / "a.jsonl.partial", time.monotonic() + 60
     while not (partial.exists() and partial.stat().st_size > 5000) and time.monotonic() < deadline:
         time.sleep(0.05)

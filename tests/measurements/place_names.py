@@ -1,6 +1,6 @@
 """How many rooms and locations of generated houses are named right, by each method, from the true lists of objects.
 
-    python tests/nodes/naming/measure_place_names.py [FIRST-LAST] [MODEL.gguf]
+    python tests/measurements/place_names.py [FIRST-LAST] [MODEL.gguf]
 
 Prints for each method and layer: places, right first names, seconds a house, calls of the language model.
 """
@@ -14,8 +14,8 @@ from placegraph.runtime.language.word_forms import normal_form, synonyms
 from placegraph.runtime.messages import Graph
 from placegraph.runtime.node import Context
 from placegraph.runtime.scene_graph import SceneGraph
-from placegraph.tools.simulator.build import build
-from placegraph.tools.simulator.true_graph import true_graph
+from placegraph.tools.simulator.ground_truth_graph import ground_truth_graph
+from placegraph.tools.simulator.house_frames import generate_house
 
 
 def without_place_names(graph: SceneGraph) -> Graph:
@@ -35,7 +35,7 @@ def is_right(name: str, truth: str) -> bool:
 
 def main(seeds: range, model_path: str) -> None:
     """Print one line a method and layer."""
-    truths = [true_graph(build(seed)) for seed in seeds]
+    truths = [ground_truth_graph(generate_house(seed)) for seed in seeds]
     for method in ("evidence", "language_model"):
         node = NODE(NamingConfig(method=method, model_path=model_path), Context())
         began_s = time.monotonic()

@@ -1,4 +1,4 @@
-"""Average precision of boxes in images, as COCO computes it at one overlap."""
+"""Metrics of networks: average precision of boxes (as COCO computes it at one overlap) and of tags, IoU of masks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class TrueBoxes:
     ignored: Bool
 
 
-def average_precisions(
+def box_average_precisions(
     detected: Sequence[DetectedBoxes], true: Sequence[TrueBoxes], classes: int, min_iou: float = 0.5
 ) -> F64:
     """AP (classes,) over images in order; NaN where no true box of a class counts.
@@ -40,7 +40,7 @@ def average_precisions(
     overlaps only an ignored true box by that much is neither right nor wrong.
     """
     best = [_best(boxes) for boxes in detected]
-    return np.array([_class_average_precision(best, true, k, min_iou) for k in range(classes)])
+    return np.array([_box_average_precision(best, true, k, min_iou) for k in range(classes)])
 
 
 def mean_of_defined(values: F64) -> float:
@@ -54,7 +54,7 @@ def _best(detected: DetectedBoxes) -> DetectedBoxes:
     return DetectedBoxes(detected.boxes[order], detected.classes[order], detected.scores[order])
 
 
-def _class_average_precision(
+def _box_average_precision(
     detected: Sequence[DetectedBoxes], true: Sequence[TrueBoxes], class_index: int, min_iou: float
 ) -> float:
     scores, right, count = [np.zeros(0)], [np.zeros(0, bool)], 0
@@ -103,3 +103,32 @@ def box_ious(a: F64, b: F64) -> F64:
     area_a, area_b = (np.prod(np.maximum(boxes[:, 2:] - boxes[:, :2], 0), axis=1) for boxes in (a, b))
     union = area_a[:, None] + area_b[None] - shared
     return np.asarray(np.divide(shared, union, out=np.zeros_like(shared, np.float64), where=union > 0))
+
+
+def tag_average_precisions(scores: F64, true: F64) -> F64:
+    """AP (C,) of scores (V, C) of views and classes; true (V, C) is 1, 0, or NaN where the view does not say.
+
+    NaN for a class that no view shows. Views of equal score count together, so that their order does not matter.
+    """
+    return np.array([_tag_average_precision(scores[:, k], true[:, k]) for k in range(scores.shape[1])])
+
+
+def _tag_average_precision(scores: F64, true: F64) -> float:
+    judged = ~np.isnan(true)
+    scores, shown = scores[judged], true[judged] > 0
+    if not shown.any():
+        return float("nan")
+    order = np.argsort(-scores, kind="stable")
+    last_of_score = np.append(scores[order][1:] != scores[order][:-1], True)
+    hits = np.cumsum(shown[order])[last_of_score]
+    precision = hits / (np.flatnonzero(last_of_score) + 1)
+    return float((np.diff(hits, prepend=0) * precision).sum() / shown.sum())
+
+
+def mask_ious(masks: Sequence[Bool], true_masks: Sequence[Bool]) -> F64:
+    """(N,) IoU of each mask (H, W) with the true one at the same index; NaN where both are empty."""
+    values = []
+    for mask, true_mask in zip(masks, true_masks, strict=True):
+        union = int((mask | true_mask).sum())
+        values.append(int((mask & true_mask).sum()) / union if union else float("nan"))
+    return np.array(values, np.float64)
