@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool
+from placegraph.runtime.vision.features import FeatureConfig, ViewFeatures, extract_features
 from placegraph.runtime.vision.geometry import transform
 from placegraph.runtime.vision.point_to_plane import SurfaceConfig, SurfaceMap, coarse_depth, scan_points
 from placegraph.runtime.vision.registration import (
@@ -55,11 +56,17 @@ class RgbdView:
     gray: U8
     depth_m: F32
     intrinsics: F64
+    feature_config: FeatureConfig
 
     @cached_property
     def coarse_m(self) -> F32:
         """Depth on the grid of surfaces, see `coarse_depth`."""
         return coarse_depth(self.depth_m)
+
+    @cached_property
+    def features(self) -> ViewFeatures:
+        """ORB features, computed for the few views that are remembered or compared with remembered ones."""
+        return extract_features(self.gray, self.depth_m, self.intrinsics, self.feature_config)
 
 
 @dataclass(frozen=True, eq=False)

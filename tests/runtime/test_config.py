@@ -52,7 +52,10 @@ def test_absent_file_lists_those_that_come_with_placegraph(tmp_path: Path) -> No
         (CAMERA + "[nodes.pos]", "no node named 'pos'; there are: .*pose"),
         (CAMERA + "[nodes.pose]\ngian = 1", r"\[nodes.pose\] gian: Extra inputs are not permitted"),
         (CAMERA + '[nodes.pose]\nstride = "4"', r"\[nodes.pose\] stride: Input should be a valid integer"),
-        (CAMERA + "[nodes.pose]\nvoxel_m = 0.0", r"\[nodes.pose\] voxel_m: Input should be greater than 0"),
+        (
+            CAMERA + "[nodes.pose.kiss_icp]\nvoxel_m = 0.0",
+            r"\[nodes.pose\] kiss_icp.voxel_m: Input should be greater",
+        ),
         (CAMERA + "[nodes.keyframe]", "keyframe takes Pose, which nothing gives"),
         (
             CAMERA + '[nodes.pose]\n[nodes.keyframe]\n[nodes.tagger]\nmodel="a"\n[nodes.instances]\nmodel="b"\n'
