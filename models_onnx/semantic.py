@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.models_onnx import Boxes, Instances, Masks, ScoredNames
-from placegraph.models_onnx.boxes import box_iou
+from placegraph.models_onnx.boxes import image_box_iou
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.runtime.arrays import F32, U8, Bool
@@ -96,7 +96,7 @@ class FAMILY:
         empty = np.zeros(image.shape[:2], bool)
         masks: Masks = []
         for box in boxes_px:
-            overlap = box_iou(box, pieces.boxes.boxes_px)
+            overlap = image_box_iou(box, pieces.boxes.boxes_px)
             best = int(overlap.argmax()) if len(overlap) else -1
             masks.append(pieces.masks[best] if best >= 0 and overlap[best] > 0 else empty)
         return masks

@@ -87,7 +87,7 @@ class FAMILY:
         certainty = raw.scores.max(axis=1)
         masks: Masks = []
         for box in boxes_px:
-            overlap = boxes.box_iou(box, raw.boxes_px)
+            overlap = boxes.image_box_iou(box, raw.boxes_px)
             fitness = np.where(overlap >= self._options.prompt_iou, overlap * certainty, -1)
             best = int(fitness.argmax()) if len(fitness) else -1
             if best < 0 or fitness[best] < 0:

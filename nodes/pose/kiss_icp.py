@@ -26,7 +26,7 @@ MAX_JUDGED_POINTS = 1000
 class KissIcpConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """Values for an indoor depth camera, chosen on 7-Scenes (docs/results.md)."""
 
-    voxel_m: float = Field(0.1, gt=0)
+    voxel_m: float = Field(default=0.1, gt=0)
     max_points_per_voxel: int = 20
     initial_threshold_m: float = 0.3  # KISS-ICP's 2.0 is for cars
     min_motion_m: float = 0.02

@@ -71,7 +71,7 @@ def grounding_scores(
     ious = []
     for question, reply in zip(questions, replies, strict=True):
         answered = reply.status == "found" and reply.object_id in boxes
-        ious.append(box_iou(boxes[reply.object_id], question.box) if answered else 0.0)
+        ious.append(float(box_iou(boxes[reply.object_id], question.box)) if answered else 0.0)
     overlap = np.array(ious)
     forms = np.array([question.form for question in questions], object)
     return {
