@@ -10,7 +10,7 @@ from pydantic import Field
 
 from placegraph.models_onnx import Segmenter
 from placegraph.models_onnx.load import load, wrong_task
-from placegraph.models_onnx.segments import pack_segments
+from placegraph.models_onnx.masks import pack_segments
 from placegraph.runtime.messages import Detections, Keyframe, Message, Segments
 from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Node, NodeConfig
