@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from placegraph.models_onnx import LocationDetector
-from placegraph.models_onnx.load import load, wrong_task
+from placegraph.models_onnx.load import load_for_node
 from placegraph.nodes.hierarchy.floors import FloorConfig
 from placegraph.nodes.hierarchy.graph_builder import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
@@ -52,10 +52,7 @@ class HierarchyNode(Node):
         """
         name = self.config.locations.model
         if name:
-            model = load(name, self.context.model_dirs, self.context.threads)
-            if not isinstance(model, LocationDetector):
-                raise wrong_task("hierarchy", name, model, "find locations")
-            self._builder = GraphBuilder(self._layers, model)
+            self._builder = GraphBuilder(self._layers, load_for_node(LocationDetector, name, "hierarchy", self.context))
 
     def step(self, message: Message) -> Sequence[Message]:
         """Build or name a graph. Names of another revision are late and ignored. Raises SchemaError for unknown ids."""

@@ -69,7 +69,7 @@ class Networks:
         if not isinstance(tagger, Tagger):
             raise ConfigError(f"--tagger: {names[0]!r} cannot tag images")
         if not isinstance(detector, Detector):
-            raise ConfigError(f"--detector: {names[1]!r} cannot find_weights boxes")
+            raise ConfigError(f"--detector: {names[1]!r} cannot find boxes")
         if not isinstance(segmenter, Segmenter):
             raise ConfigError(f"--segmenter: {names[2]!r} cannot give masks for boxes")
         return cls(tagger, detector, segmenter)
