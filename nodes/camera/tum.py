@@ -22,6 +22,7 @@ from placegraph.nodes.camera._dataset_reader import (
     NO_POSE,
     SourceSettings,
     check_centre,
+    check_folder,
     check_intrinsics,
     read_color_and_depth,
     read_numbers,
@@ -60,8 +61,7 @@ class Tum:
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self._settings = read_settings(Settings, settings)
-        if not path.is_dir():
-            raise SourceError(f"{path}: no such folder")
+        check_folder(path)
         self._folder = path
         window_ns = round(self._settings.max_difference_s * 1e9)
         colors, color_files = _read_list(path / "rgb.txt")
