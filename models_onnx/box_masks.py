@@ -18,7 +18,7 @@ from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.masks import mask_in_box
 from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.yolo import prepare_input
-from placegraph.runtime.arrays import F32, U8, Bool, Points
+from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import ModelError
 
 
@@ -83,11 +83,7 @@ class FAMILY:
 
     def _mask(self, logits: F32, box_px: F32, size: tuple[int, int]) -> Bool:
         """One grid of logits (G, G) to the mask (H, W) of the image, cut to the box."""
-
-        def grid_at(x: int, y: int) -> tuple[Points, Points]:
-            box_size = box_px[2:] - box_px[:2]
-            low = box_px[:2] - self._options.margin * box_size
-            scale = len(logits) / ((1 + 2 * self._options.margin) * box_size)  # cells per px
-            return scale, (np.array([x, y], np.float32) + np.float32(0.5) - low) * scale - np.float32(0.5)
-
-        return mask_in_box(logits, box_px, size, grid_at)
+        box_size = np.maximum(box_px[2:] - box_px[:2], 1e-3).astype(np.float64)  # a box without area has no mask anyway
+        low = box_px[:2] - self._options.margin * box_size
+        scale = len(logits) / ((1 + 2 * self._options.margin) * box_size)  # cells per px
+        return mask_in_box(logits, scale, (0.5 - low) * scale - 0.5, box_px, size)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -11,32 +11,21 @@ from placegraph.models_onnx import Masks
 from placegraph.runtime.arrays import F32, Bool, Points
 from placegraph.runtime.messages import Keyframe, Segments
 
-Pair = Sequence[float] | Points  # x and y
 
-
-def mask_of_logits(logits: F32, scale: Pair, offset: Pair, size: tuple[int, int]) -> Bool:
-    """A mask (height, width) from logits on another grid, resampled bilinearly: positive inside.
-
-    scale, offset: pixel x y of the mask is at cell (x, y) * scale + offset; whole numbers are centres.
-    """
-    to_cell = np.array([[scale[0], 0, offset[0]], [0, scale[1], offset[1]]])
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    resampled = cv2.warpAffine(logits, to_cell, (size[1], size[0]), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(resampled > 0)
-
-
-def mask_in_box(
-    logits: F32, box_px: F32, size: tuple[int, int], grid_at: Callable[[int, int], tuple[Pair, Pair]]
-) -> Bool:
+def mask_in_box(logits: F32, scale: Points, offset: Points, box_px: F32, size: tuple[int, int]) -> Bool:
     """A mask of an image (height, width) from logits on another grid, cut to a box (4,) in px.
 
-    grid_at: scale and offset, as in `mask_of_logits`, of a mask whose first pixel is x y of the image.
+    scale, offset (2,): pixel x y of the image is at cell (x, y) * scale + offset, whole numbers are centres. Logits are
+    resampled bilinearly; positive is inside.
     """
     mask = np.zeros(size, bool)
     x0, y0 = (max(int(v), 0) for v in np.floor(box_px[:2] + 0.5))
     x1, y1 = (min(int(v), limit) for v, limit in zip(np.floor(box_px[2:] + 0.5), size[::-1], strict=True))
     if x1 > x0 and y1 > y0:
-        mask[y0:y1, x0:x1] = mask_of_logits(logits, *grid_at(x0, y0), (y1 - y0, x1 - x0))
+        to_cell = np.column_stack((np.diag(scale), np.array([x0, y0]) * scale + offset)).astype(np.float64)
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        window = cv2.warpAffine(logits, to_cell, (x1 - x0, y1 - y0), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        mask[y0:y1, x0:x1] = window > 0
     return mask
 
 

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from placegraph.models_onnx import Masks
 from placegraph.models_onnx.manifest import ModelOptions, Weights
-from placegraph.models_onnx.masks import mask_of_logits
+from placegraph.models_onnx.masks import mask_in_box
 from placegraph.models_onnx.session import Session, Shape
 from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import ModelError
@@ -110,4 +110,5 @@ def upscale(low: F32, scales: F32, size: tuple[int, int]) -> Bool:
     are not used, because tracing freezes the crop of some exports to the aspect of the image they were traced with.
     """
     cells = scales * (LOW_RES / LONG_SIDE)  # low-resolution cells per px of the image
-    return mask_of_logits(low, cells, 0.5 * cells - 0.5, size)
+    whole_px = np.array([0, 0, size[1], size[0]], np.float32)
+    return mask_in_box(low, cells, 0.5 * cells - 0.5, whole_px, size)

@@ -127,15 +127,10 @@ class FAMILY:
         """
         placed, (_, rows, columns) = raw.placed, raw.prototypes.shape
         logits = np.tensordot(coefficients, raw.prototypes, axes=1).astype(np.float32)
-        step_x, step_y = columns / self._width, rows / self._height  # prototype cells per px of the input
-
-        def grid_at(x: int, y: int) -> tuple[tuple[float, float], tuple[float, float]]:
-            return (placed.scale_x * step_x, placed.scale_y * step_y), (
-                ((x + 0.5) * placed.scale_x + placed.pad_x) * step_x - 0.5,
-                ((y + 0.5) * placed.scale_y + placed.pad_y) * step_y - 0.5,
-            )
-
-        return mask_in_box(logits, box_px, (placed.height, placed.width), grid_at)
+        cells = np.array([columns / self._width, rows / self._height])  # prototype cells per px of the input
+        scale = np.array([placed.scale_x, placed.scale_y])
+        offset = (0.5 * scale + (placed.pad_x, placed.pad_y)) * cells - 0.5
+        return mask_in_box(logits, scale * cells, offset, box_px, (placed.height, placed.width))
 
 
 def _output_names(session: Session) -> tuple[str, str]:

@@ -20,18 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._dataset_reader import (
-    NumberedFrames,
-    SourceSettings,
-    check_centre,
-    check_folder,
-    check_intrinsics,
-    check_same_frames,
-    numbered_files,
-    read_color_and_depth,
-    read_pose,
-    read_settings,
-)
+from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
 
@@ -41,7 +30,7 @@ WORLD_FROM_HABITAT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 
 HABITAT_CAMERA_FROM_CAMERA = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of a walk."""
 
     rate_hz: float = Field(5.0, gt=0)  # frame numbers are turned into times with it: HOV-SG's steps of .2 m at 1 m/s
@@ -49,7 +38,7 @@ class Settings(SourceSettings):
     intrinsics: list[float] | None = Field(None, min_length=4, max_length=4)
 
 
-class Hm3dSem(NumberedFrames):
+class Hm3dSem(reader.NumberedFrames):
     """Frames of one walk."""
 
     summary: ClassVar[str] = (
@@ -57,14 +46,15 @@ class Hm3dSem(NumberedFrames):
     )
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
-        check_folder(path)
+        self._settings = reader.read_settings(Settings, settings)
+        reader.check_folder(path)
         self.rate_hz = self._settings.rate_hz
-        self.numbers = self._colors = numbered_files(path / "rgb", IMAGE)
+        self.numbers = self._colors = reader.numbered_files(path / "rgb", IMAGE)
         if not self._colors:
             raise SourceError(f"{path / 'rgb'}: no SCENE_000000.png")
-        self._depths, self._poses = numbered_files(path / "depth", IMAGE), numbered_files(path / "pose", POSE)
-        check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
+        self._depths = reader.numbered_files(path / "depth", IMAGE)
+        self._poses = reader.numbered_files(path / "pose", POSE)
+        reader.check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
 
     @staticmethod
     def matches(path: Path) -> bool:
@@ -75,12 +65,12 @@ class Hm3dSem(NumberedFrames):
 
     def read_images(self, number: int) -> tuple[U8, U16, F64]:
         """Images and pinhole of a frame."""
-        color, depth = read_color_and_depth(self._colors[number], self._depths[number])
+        color, depth = reader.read_color_and_depth(self._colors[number], self._depths[number])
         return color, depth, self._intrinsics(depth.shape)
 
     def read_pose(self, number: int) -> F64:
         """world_from_camera (4, 4) in metres, z up, camera z forward."""
-        pose = WORLD_FROM_HABITAT @ read_pose(self._poses[number]) @ HABITAT_CAMERA_FROM_CAMERA
+        pose = WORLD_FROM_HABITAT @ reader.read_pose(self._poses[number]) @ HABITAT_CAMERA_FROM_CAMERA
         if not np.isfinite(pose).all():
             raise SourceError(f"{self._poses[number]}: not a rigid pose: the simulator knows every pose")
         return pose
@@ -90,7 +80,7 @@ class Hm3dSem(NumberedFrames):
         where = "[nodes.camera.settings] intrinsics"
         focal = width / 2  # 90 degrees; pixels are square
         intrinsics = np.array(self._settings.intrinsics or [focal, focal, (width - 1) / 2, (height - 1) / 2])
-        check_centre(check_intrinsics(intrinsics, where), size, where)
+        reader.check_centre(reader.check_intrinsics(intrinsics, where), size, where)
         return intrinsics
 
 

@@ -16,17 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
-from placegraph.nodes.camera._dataset_reader import (
-    NumberedFrames,
-    SourceSettings,
-    check_centre,
-    check_folder,
-    check_same_frames,
-    numbered_files,
-    read_color_and_depth,
-    read_settings,
-    read_text,
-)
+from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.vision.geometry import is_rigid
@@ -35,7 +25,7 @@ COLOR, DEPTH = re.compile(r"frame(\d+)\.jpg"), re.compile(r"depth(\d+)\.png")
 CAMERA, TRACK = "cam_params.json", "traj.txt"
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of a Replica scene."""
 
     rate_hz: float = Field(30.0, gt=0)  # frame numbers are turned into times with it; no rate is published
@@ -59,7 +49,7 @@ class CameraFile(BaseModel, frozen=True):
     camera: Pinhole
 
 
-class Replica(NumberedFrames):
+class Replica(reader.NumberedFrames):
     """Frames of one scene."""
 
     summary: ClassVar[str] = (
@@ -68,15 +58,15 @@ class Replica(NumberedFrames):
     )
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
-        check_folder(path)
+        self._settings = reader.read_settings(Settings, settings)
+        reader.check_folder(path)
         self.rate_hz = self._settings.rate_hz
         images = path / "results"
-        self.numbers = self._colors = numbered_files(images, COLOR)
-        self._depths = numbered_files(images, DEPTH)
+        self.numbers = self._colors = reader.numbered_files(images, COLOR)
+        self._depths = reader.numbered_files(images, DEPTH)
         if not self._colors:
             raise SourceError(f"{images}: no frame*.jpg")
-        check_same_frames({"colour": self._colors, "depth": self._depths})
+        reader.check_same_frames({"colour": self._colors, "depth": self._depths})
         self._camera_file = path / CAMERA if (path / CAMERA).exists() else path.absolute().parent / CAMERA
         self._camera = _read_camera(self._camera_file)
         self.depth_unit_m = 1.0 / self._camera.scale
@@ -92,13 +82,13 @@ class Replica(NumberedFrames):
 
     def read_images(self, number: int) -> tuple[U8, U16, F64]:
         """Images of a frame; raises SourceError also where they are not of the size that cam_params.json says."""
-        color, depth = read_color_and_depth(self._colors[number], self._depths[number])
+        color, depth = reader.read_color_and_depth(self._colors[number], self._depths[number])
         camera = self._camera
         if depth.shape != (camera.h, camera.w):
             size = f"{depth.shape[1]}x{depth.shape[0]}"
             raise SourceError(f"{self._colors[number]}: is {size}; {self._camera_file} says {camera.w}x{camera.h}")
         intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-        check_centre(intrinsics, depth.shape, str(self._camera_file))
+        reader.check_centre(intrinsics, depth.shape, str(self._camera_file))
         return color, depth, intrinsics
 
     def read_pose(self, number: int) -> F64:
@@ -108,7 +98,7 @@ class Replica(NumberedFrames):
 
 def _read_camera(file: Path) -> Pinhole:
     try:
-        return CameraFile.model_validate_json(read_text(file)).camera
+        return CameraFile.model_validate_json(reader.read_text(file)).camera
     except ValidationError as error:
         first = error.errors()[0]
         raise SourceError(f"{file}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}") from None
@@ -117,7 +107,7 @@ def _read_camera(file: Path) -> Pinhole:
 def _read_track(file: Path) -> list[F64]:
     """A (4, 4) world_from_camera in metres for each line."""
     poses = []
-    for number, line in enumerate(read_text(file).splitlines(), 1):
+    for number, line in enumerate(reader.read_text(file).splitlines(), 1):
         try:
             pose = np.array([float(word) for word in line.split()]).reshape(4, 4)
         except ValueError:

@@ -22,19 +22,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._dataset_reader import (
-    NumberedFrames,
-    SourceSettings,
-    check_centre,
-    check_folder,
-    check_same_frames,
-    numbered_files,
-    read_color,
-    read_depth,
-    read_pinhole,
-    read_pose,
-    read_settings,
-)
+from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
 
@@ -44,13 +32,13 @@ COLOR, DEPTH, POSE = re.compile(r"(\d+)\.jpg"), re.compile(r"(\d+)\.png"), re.co
 MAX_VIEW_RATIO = 1.25
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of a ScanNet scene."""
 
     rate_hz: float = Field(30.0, gt=0)  # frame numbers are turned into times with it; the sensor's rate
 
 
-class ScanNet(NumberedFrames):
+class ScanNet(reader.NumberedFrames):
     """Frames of one scene."""
 
     summary: ClassVar[str] = (
@@ -59,19 +47,20 @@ class ScanNet(NumberedFrames):
     )
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
-        check_folder(path)
+        self._settings = reader.read_settings(Settings, settings)
+        reader.check_folder(path)
         self.rate_hz = self._settings.rate_hz
-        self.numbers = self._colors = numbered_files(path / "color", COLOR)
+        self.numbers = self._colors = reader.numbered_files(path / "color", COLOR)
         if not self._colors:
             raise SourceError(f"{path / 'color'}: no N.jpg")
-        self._depths, self._poses = numbered_files(path / "depth", DEPTH), numbered_files(path / "pose", POSE)
-        check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
+        self._depths = reader.numbered_files(path / "depth", DEPTH)
+        self._poses = reader.numbered_files(path / "pose", POSE)
+        reader.check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
         self._color_file, self._depth_file = (
             path / "intrinsic" / f"intrinsic_{kind}.txt" for kind in ("color", "depth")
         )
-        self._color_intrinsics = read_pinhole(self._color_file, size=4)
-        self._depth_intrinsics = read_pinhole(self._depth_file, size=4)
+        self._color_intrinsics = reader.read_pinhole(self._color_file, size=4)
+        self._depth_intrinsics = reader.read_pinhole(self._depth_file, size=4)
 
     @staticmethod
     def matches(path: Path) -> bool:
@@ -80,19 +69,19 @@ class ScanNet(NumberedFrames):
 
     def read_images(self, number: int) -> tuple[U8, U16, F64]:
         """Images of a frame, of depth's size and pinhole; depth in mm (SensReader's README: depth shift 1000)."""
-        color, depth = read_color(self._colors[number]), read_depth(self._depths[number])
+        color, depth = reader.read_color(self._colors[number]), reader.read_depth(self._depths[number])
         self._check_sizes(self._colors[number], color.shape[:2], depth.shape)
         color = reproject_color(color, self._color_intrinsics, self._depth_intrinsics, depth.shape)
         return color, depth, self._depth_intrinsics
 
     def read_pose(self, number: int) -> F64:
         """The pose in the frame's file."""
-        return read_pose(self._poses[number])
+        return reader.read_pose(self._poses[number])
 
     def _check_sizes(self, color_path: Path, color_size: tuple[int, ...], depth_size: tuple[int, int]) -> None:
         height, width = color_size
-        check_centre(self._depth_intrinsics, depth_size, str(self._depth_file))
-        check_centre(self._color_intrinsics, (height, width), str(self._color_file))
+        reader.check_centre(self._depth_intrinsics, depth_size, str(self._depth_file))
+        reader.check_centre(self._color_intrinsics, (height, width), str(self._color_file))
         view = (self._color_intrinsics[0] / width) / (self._depth_intrinsics[0] / depth_size[1])
         if not 1 / MAX_VIEW_RATIO < view < MAX_VIEW_RATIO:
             raise SourceError(

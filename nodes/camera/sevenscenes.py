@@ -14,18 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._dataset_reader import (
-    NumberedFrames,
-    SourceSettings,
-    check_centre,
-    check_folder,
-    check_intrinsics,
-    numbered_files,
-    read_color_and_depth,
-    read_pinhole,
-    read_pose,
-    read_settings,
-)
+from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
 
@@ -33,7 +22,7 @@ FRAME = re.compile(r"frame-(\d+)\.color\.(jpg|png)")
 NO_READING = 65535  # the data set's value for "no depth", beside 0
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of a 7-Scenes folder."""
 
     rate_hz: float = Field(30.0, gt=0)  # frame numbers are turned into times with it; Kinect v1
@@ -41,7 +30,7 @@ class Settings(SourceSettings):
     intrinsics: list[float] = Field([585.0, 585.0, 320.0, 240.0], min_length=4, max_length=4)
 
 
-class SevenScenes(NumberedFrames):
+class SevenScenes(reader.NumberedFrames):
     """Frames of one sequence."""
 
     summary: ClassVar[str] = (
@@ -50,37 +39,37 @@ class SevenScenes(NumberedFrames):
     has_z_up: ClassVar[bool] = False
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
+        self._settings = reader.read_settings(Settings, settings)
         self.rate_hz, self._folder = self._settings.rate_hz, _sequence(path)
-        self.numbers = self._colors = numbered_files(self._folder, FRAME)
+        self.numbers = self._colors = reader.numbered_files(self._folder, FRAME)
         if not self._colors:
             raise SourceError(f"{self._folder}: no frame-*.color.jpg or .png")
         file = self._folder / "camera-intrinsics.txt"
         if not file.exists() and (path / file.name).exists():  # one calibration above the sequences
             file = path / file.name
         self._intrinsics_from = str(file) if file.exists() else "[nodes.camera.settings] intrinsics"
-        by_setting = np.array(self._settings.intrinsics)
-        self._intrinsics = read_pinhole(file) if file.exists() else check_intrinsics(by_setting, self._intrinsics_from)
+        intrinsics = reader.read_pinhole(file) if file.exists() else np.array(self._settings.intrinsics)
+        self._intrinsics = reader.check_intrinsics(intrinsics, self._intrinsics_from)
 
     @staticmethod
     def matches(path: Path) -> bool:
         """Whether the folder, or its only sequence, holds frame-*.color files."""
         try:
-            return bool(numbered_files(_sequence(path), FRAME))
+            return bool(reader.numbered_files(_sequence(path), FRAME))
         except (SourceError, OSError):
             return False
 
     def read_images(self, number: int) -> tuple[U8, U16, F64]:
         """Images of a frame, depth in mm."""
         color_path = self._colors[number]
-        color, depth = read_color_and_depth(color_path, self._beside(color_path, "depth.png"))
-        check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
+        color, depth = reader.read_color_and_depth(color_path, self._beside(color_path, "depth.png"))
+        reader.check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
         depth[depth == NO_READING] = 0
         return color, depth, self._intrinsics
 
     def read_pose(self, number: int) -> F64:
         """The pose in the frame's file."""
-        return read_pose(self._beside(self._colors[number], "pose.txt"))
+        return reader.read_pose(self._beside(self._colors[number], "pose.txt"))
 
     @staticmethod
     def _beside(color_path: Path, ending: str) -> Path:
@@ -89,9 +78,9 @@ class SevenScenes(NumberedFrames):
 
 def _sequence(path: Path) -> Path:
     """The folder with the frames: the path itself, or its only seq-NN."""
-    check_folder(path)
+    reader.check_folder(path)
     sequences = sorted(folder for folder in path.glob("seq-*") if folder.is_dir())
-    if not sequences or numbered_files(path, FRAME):
+    if not sequences or reader.numbered_files(path, FRAME):
         return path
     if len(sequences) > 1:
         names = ", ".join(folder.name for folder in sequences)
