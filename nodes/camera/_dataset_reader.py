@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from placegraph.nodes.camera import FrameSource
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import Frame
@@ -30,10 +31,9 @@ class SourceSettings(BaseModel):
 S = TypeVar("S", bound=SourceSettings)
 
 
-class NumberedFrames:
+class NumberedFrames(FrameSource):
     """Base of sources whose frames have a number and no time: numbers are turned into times by a rate."""
 
-    live: ClassVar[bool] = False
     has_z_up: ClassVar[bool] = True  # the world of the poses has z up, so a pose also gives which way is up
     numbers: Collection[int]  # of the frames, ascending
     rate_hz: float

@@ -67,11 +67,6 @@ class Flat(NumberedFrames):
         self._rays = np.stack((x, y, np.ones_like(x)), axis=-1).astype(np.float32)  # camera frame, z = 1
         self._boxes = _boxes(self.settings.seed)
 
-    @staticmethod
-    def matches(path: Path) -> bool:
-        """Never: the flat has no path."""
-        return False
-
     def read_images(self, number: int) -> tuple[U8, U16, F64]:
         """The rendered images of a frame."""
         color, depth, _ = self.render(number)

@@ -18,6 +18,7 @@ import depthai as dai
 import numpy as np
 from pydantic import Field
 
+from placegraph.nodes.camera import FrameSource
 from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
@@ -40,7 +41,7 @@ class Settings(reader.SourceSettings):
     gravity_time_s: float = Field(1.0, gt=0)  # time constant of the low pass on the accelerometer
 
 
-class Oak:
+class Oak(FrameSource):
     """Frames of one camera until it is lost or the run ends."""
 
     summary: ClassVar[str] = "no path: an OAK camera with stereo depth (source = 'oak')"
@@ -48,11 +49,6 @@ class Oak:
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self._settings = reader.read_settings(Settings, settings)
-
-    @staticmethod
-    def matches(path: Path) -> bool:
-        """Never: a device has no path."""
-        return False
 
     def frames(self) -> Iterator[Frame]:
         """Frames as they come. Raises SourceError when no camera is found, it cannot be opened, or it is lost."""
@@ -79,10 +75,6 @@ class Oak:
                 yield read_group(group["rgb"], group["depth"], frame_id, up)
                 frame_id += 1
             raise SourceError(f"OAK camera {info.deviceId}: lost (unplugged, or its pipeline stopped)")
-
-    def given_poses(self) -> dict[int, F64] | None:
-        """None: a camera does not know where it is."""
-        return None
 
 
 @dataclass

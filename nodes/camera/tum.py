@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation, Slerp
 
+from placegraph.nodes.camera import FrameSource
 from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.errors import ConfigError, SourceError
@@ -41,13 +42,12 @@ class Settings(reader.SourceSettings):
     intrinsics: list[float] | None = Field(None, min_length=4, max_length=4)  # fx fy cx cy in px
 
 
-class Tum:
+class Tum(FrameSource):
     """Frames of one sequence."""
 
     summary: ClassVar[str] = (
         "a TUM RGB-D folder: rgb.txt and depth.txt (lines of `time file`); optional groundtruth.txt, calibration.txt"
     )
-    live: ClassVar[bool] = False
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self._settings = reader.read_settings(Settings, settings)
