@@ -37,20 +37,20 @@ class ScoredNames:
 
 
 @dataclass(frozen=True)
-class Boxes:
+class NamedBoxes:
     """Named boxes (N, 4) in px, best first, with scores (N,) in 0..1."""
 
     names: tuple[str, ...]
     boxes_px: F32
     scores: F32
 
-    def best(self, min_score: float, max_count: int) -> Boxes:
+    def best(self, min_score: float, max_count: int) -> NamedBoxes:
         """The first `max_count` boxes that reach a score."""
         return self.at(best_rows(self.scores, min_score, max_count))
 
-    def at(self, rows: I64) -> Boxes:
+    def at(self, rows: I64) -> NamedBoxes:
         """The boxes with these indices."""
-        return Boxes(tuple(self.names[i] for i in rows.tolist()), self.boxes_px[rows], self.scores[rows])
+        return NamedBoxes(tuple(self.names[i] for i in rows.tolist()), self.boxes_px[rows], self.scores[rows])
 
     def as_message(self, keyframe: Keyframe) -> Detections:
         """The Detections of a keyframe."""
@@ -67,7 +67,7 @@ class Boxes:
 class Instances:
     """Named boxes with a mask each, (H, W) bool of the whole image."""
 
-    boxes: Boxes
+    boxes: NamedBoxes
     masks: Masks
 
     def best(self, min_score: float, max_count: int) -> Instances:
@@ -97,8 +97,8 @@ class Tagger(Protocol):
 class Detector(Protocol):
     """Image and the names to look for to boxes; a fixed-class family ignores the names."""
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
-        """Boxes of what was found."""
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
+        """The objects that were found, best first."""
         ...
 
 
@@ -116,7 +116,7 @@ class InstanceSegmenter(Protocol):
     """Image to boxes and masks in one pass."""
 
     def instances(self, image: U8, names: Sequence[str]) -> Instances:
-        """Boxes of what was found, each with its mask."""
+        """The objects that were found, each with its mask, best first."""
         ...
 
 

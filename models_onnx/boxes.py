@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes
+from placegraph.models_onnx import NamedBoxes
 from placegraph.runtime.arrays import F32, I64
 from placegraph.runtime.vision.geometry import box_iou
 
@@ -46,9 +46,9 @@ def best_classes(scores: F32, min_score: float) -> tuple[I64, I64, F32]:
     return anchors, classes[anchors], best[anchors].astype(np.float32)
 
 
-def named_boxes(names: Sequence[str], classes: I64, boxes: F32, scores: F32) -> Boxes:
+def named_boxes(names: Sequence[str], classes: I64, boxes: F32, scores: F32) -> NamedBoxes:
     """Boxes (N, 4) of class indices (N,) as named boxes; empty ones (all outside the image) are left out."""
     has_area = np.all(boxes[:, 2:] > boxes[:, :2], axis=1)
     kept_names = tuple(names[i] for i in classes[has_area].tolist())
     clipped = np.clip(scores[has_area], 0, 1).astype(np.float32)
-    return Boxes(kept_names, np.ascontiguousarray(boxes[has_area], np.float32), clipped)
+    return NamedBoxes(kept_names, np.ascontiguousarray(boxes[has_area], np.float32), clipped)

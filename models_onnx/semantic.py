@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from placegraph.models_onnx import Boxes, Instances, Masks, ScoredNames
+from placegraph.models_onnx import Instances, Masks, NamedBoxes, ScoredNames
 from placegraph.models_onnx.boxes import image_box_iou
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
@@ -66,14 +66,14 @@ class FAMILY:
                     score = float(confidence[mask].mean(dtype=np.float64))
                     pieces_found.append((score, self._labels[label], [x, y, x + width, y + height], mask))
         pieces_found.sort(key=lambda item: -item[0])  # stable: equal scores stay in order of class, then of first row
-        boxes = Boxes(
+        boxes = NamedBoxes(
             names=tuple(name for _, name, _, _ in pieces_found),
             boxes_px=np.array([box for _, _, box, _ in pieces_found], np.float32).reshape(-1, 4),
             scores=np.array([score for score, _, _, _ in pieces_found], np.float32),
         )
         return Instances(boxes, [mask for _, _, _, mask in pieces_found])
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
         return self.instances(image, names).boxes
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes, boxes
+from placegraph.models_onnx import NamedBoxes, boxes
 from placegraph.models_onnx.letterbox import Letterbox, letterbox_image
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
@@ -48,7 +48,7 @@ class FAMILY:
             self._labels = weights.class_names()
             self._session.expect(outputs={self._output: (1, 4 + len(self._labels), "A")})
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the names asked for (prompted), or of the network's own classes (`names` ignored).
 
         Raises:

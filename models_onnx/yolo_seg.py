@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes, Instances, Masks, boxes
+from placegraph.models_onnx import Instances, Masks, NamedBoxes, boxes
 from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.masks import mask_in_box
@@ -69,7 +69,7 @@ class FAMILY:
         detections, anchors = self._detections(raw)
         return Instances(detections, [self._mask(raw, raw.coefficients[i], raw.boxes_px[i]) for i in anchors])
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
         return self._detections(self._run(image))[0]
 
@@ -109,7 +109,7 @@ class FAMILY:
             placed,
         )
 
-    def _detections(self, raw: _Raw) -> tuple[Boxes, list[int]]:
+    def _detections(self, raw: _Raw) -> tuple[NamedBoxes, list[int]]:
         """Named boxes and the anchor of each."""
         anchors, classes, scores = boxes.best_classes(raw.scores, self._options.min_score)
         solid = np.all(raw.boxes_px[anchors, 2:] > raw.boxes_px[anchors, :2], axis=1)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes, boxes
+from placegraph.models_onnx import NamedBoxes, boxes
 from placegraph.models_onnx.letterbox import letterbox_image
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
@@ -44,7 +44,7 @@ class FAMILY:
         self._height, self._width = height, width
         self._cells, self._strides = _grid(height, width)
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
         canvas, placed = letterbox_image(image, self._height, self._width, centred=False)
         feed = canvas[:, :, ::-1].astype(np.float32).transpose(2, 0, 1)[None]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
-from placegraph.models_onnx import Boxes, Segmenter
+from placegraph.models_onnx import NamedBoxes, Segmenter
 from placegraph.models_onnx.load import load_for_node
 from placegraph.models_onnx.masks import pack_segments
 from placegraph.runtime.messages import Detections, Keyframe, Message, Segments
@@ -48,7 +48,7 @@ class SegmenterNode(Node):
                 return []
 
     def _segment(self, keyframe: Keyframe, detections: Detections) -> Segments:
-        boxes = Boxes(detections.names, detections.boxes_px, detections.scores)
+        boxes = NamedBoxes(detections.names, detections.boxes_px, detections.scores)
         boxes = boxes.best(self.config.min_score, self.config.max_objects)
         depth_m = keyframe.depth.astype(np.float32) * np.float32(keyframe.depth_unit_m)
         masks = self._model.segment(keyframe.color, depth_m, boxes.boxes_px)
