@@ -10,9 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from placegraph.runtime.arrays import F32, U8, Bool
+import numpy as np
+
+from placegraph.runtime.arrays import F32, I64, U8, Bool
+from placegraph.runtime.messages import Detections, Keyframe
 
 Masks = list[Bool]
+
+
+def best_rows(scores: F32, min_score: float, max_count: int) -> I64:
+    """Indices of the first `max_count` scores (N,) that reach `min_score`."""
+    return np.flatnonzero(scores >= min_score)[:max_count]
 
 
 @dataclass(frozen=True)
@@ -22,22 +30,50 @@ class ScoredNames:
     names: tuple[str, ...]
     scores: F32
 
+    def best(self, min_score: float, max_count: int) -> ScoredNames:
+        """The first `max_count` names that reach a score."""
+        rows = best_rows(self.scores, min_score, max_count)
+        return ScoredNames(tuple(self.names[i] for i in rows.tolist()), self.scores[rows])
+
 
 @dataclass(frozen=True)
-class Boxes:
+class NamedBoxes:
     """Named boxes (N, 4) in px, best first, with scores (N,) in 0..1."""
 
     names: tuple[str, ...]
     boxes_px: F32
     scores: F32
 
+    def best(self, min_score: float, max_count: int) -> NamedBoxes:
+        """The first `max_count` boxes that reach a score."""
+        return self.at(best_rows(self.scores, min_score, max_count))
+
+    def at(self, rows: I64) -> NamedBoxes:
+        """The boxes with these indices."""
+        return NamedBoxes(tuple(self.names[i] for i in rows.tolist()), self.boxes_px[rows], self.scores[rows])
+
+    def as_message(self, keyframe: Keyframe) -> Detections:
+        """The Detections of a keyframe."""
+        return Detections(
+            frame_id=keyframe.frame_id,
+            stamp_ns=keyframe.stamp_ns,
+            names=self.names,
+            boxes_px=self.boxes_px,
+            scores=self.scores,
+        )
+
 
 @dataclass(frozen=True)
 class Instances:
     """Named boxes with a mask each, (H, W) bool of the whole image."""
 
-    boxes: Boxes
+    boxes: NamedBoxes
     masks: Masks
+
+    def best(self, min_score: float, max_count: int) -> Instances:
+        """The first `max_count` objects that reach a score."""
+        rows = best_rows(self.boxes.scores, min_score, max_count)
+        return Instances(self.boxes.at(rows), [self.masks[i] for i in rows.tolist()])
 
 
 @dataclass(frozen=True)
@@ -61,8 +97,8 @@ class Tagger(Protocol):
 class Detector(Protocol):
     """Image and the names to look for to boxes; a fixed-class family ignores the names."""
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
-        """Boxes of what was found."""
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
+        """The objects that were found, best first."""
         ...
 
 
@@ -80,7 +116,7 @@ class InstanceSegmenter(Protocol):
     """Image to boxes and masks in one pass."""
 
     def instances(self, image: U8, names: Sequence[str]) -> Instances:
-        """Boxes of what was found, each with its mask."""
+        """The objects that were found, each with its mask, best first."""
         ...
 
 

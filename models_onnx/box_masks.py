@@ -15,9 +15,10 @@ from pydantic import Field
 from placegraph.models_onnx import Masks
 from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
+from placegraph.models_onnx.masks import mask_in_box
 from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.yolo import prepare_input
-from placegraph.runtime.arrays import F32, U8
+from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import ModelError
 
 
@@ -57,18 +58,19 @@ class FAMILY:
         """
         if not len(boxes_px):
             return []
+        height, width = image.shape[:2]
         feed, placed = prepare_input(image, self._height, self._width)
         feeds = {"images": feed}
         if self._takes_depth:
             feeds["depth"] = self._place_depth(depth_m, placed)
         embedding = self._encoder.run(feeds)["image_embeddings"]
         shares = placed.to_input(boxes_px) / np.array([self._width, self._height] * 2, np.float32)
-        found = self._decoder.run({"image_embeddings": embedding, "boxes": shares.astype(np.float32)})
+        outputs = self._decoder.run({"image_embeddings": embedding, "boxes": shares.astype(np.float32)})
         return [
-            self._mask(logits[0], box, image.shape[:2])
+            self._mask(logits[0], box, (height, width))
             if quality[0] >= self._options.min_iou
-            else np.zeros(image.shape[:2], bool)
-            for logits, quality, box in zip(found["masks"], found["iou_predictions"], boxes_px, strict=True)
+            else np.zeros((height, width), bool)
+            for logits, quality, box in zip(outputs["masks"], outputs["iou_predictions"], boxes_px, strict=True)
         ]
 
     def _place_depth(self, depth_m: F32, placed: Letterbox) -> F32:
@@ -79,19 +81,9 @@ class FAMILY:
         canvas[placed.pad_y : placed.pad_y + height, placed.pad_x : placed.pad_x + width] = resized
         return canvas[None, None]
 
-    def _mask(self, logits: F32, box_px: F32, size: tuple[int, ...]) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        """One grid of logits (G, G) to the mask (H, W) of the image, positive inside and cut to the box."""
-        mask = np.zeros(size, bool)
-        x0, y0 = (max(int(v), 0) for v in np.floor(box_px[:2] + 0.5))
-        x1, y1 = (min(int(v), limit) for v, limit in zip(np.floor(box_px[2:] + 0.5), size[::-1], strict=True))
-        if x1 <= x0 or y1 <= y0:
-            return mask
-        low = box_px[:2] - self._options.margin * (box_px[2:] - box_px[:2])
-        step = len(logits) / ((1 + 2 * self._options.margin) * (box_px[2:] - box_px[:2]))  # cells a px
-        to_cell = np.array(
-            [[step[0], 0, (x0 + 0.5 - low[0]) * step[0] - 0.5], [0, step[1], (y0 + 0.5 - low[1]) * step[1] - 0.5]]
-        )
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        inside = cv2.warpAffine(logits, to_cell, (x1 - x0, y1 - y0), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        mask[y0:y1, x0:x1] = inside > 0
-        return mask
+    def _mask(self, logits: F32, box_px: F32, size: tuple[int, int]) -> Bool:
+        """One grid of logits (G, G) to the mask (H, W) of the image, cut to the box."""
+        box_size = np.maximum(box_px[2:] - box_px[:2], 1e-3).astype(np.float64)  # a box without area has no mask anyway
+        low = box_px[:2] - self._options.margin * box_size
+        scale = len(logits) / ((1 + 2 * self._options.margin) * box_size)  # cells per px
+        return mask_in_box(logits, scale, (0.5 - low) * scale - 0.5, box_px, size)

@@ -6,21 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes
+from placegraph.models_onnx import NamedBoxes
 from placegraph.runtime.arrays import F32, I64
+from placegraph.runtime.vision.geometry import box_iou
 
 MAX_CANDIDATES = 1000  # that enter suppression; bounds its time when a network detects things everywhere
 
 
-def box_iou(box: F32, boxes: F32) -> F32:
+def image_box_iou(box: F32, boxes: F32) -> F32:
     """Intersection over union of a box (4,) with boxes (N, 4), px; 0 where both are empty."""
-    low = np.maximum(box[:2], boxes[:, :2])
-    high = np.minimum(box[2:], boxes[:, 2:])
-    shared = np.prod(np.maximum(high - low, 0), axis=1)
-    areas = np.prod(np.maximum(boxes[:, 2:] - boxes[:, :2], 0), axis=1)
-    union = np.prod(np.maximum(box[2:] - box[:2], 0)) + areas - shared
-    ratio = np.divide(shared, union, out=np.zeros(len(boxes), np.float32), where=union > 0)
-    return np.asarray(ratio, np.float32)
+    return np.asarray(box_iou(box.reshape(2, 2), boxes.reshape(-1, 2, 2)), np.float32)
 
 
 def corners_from_centres(centres: F32) -> F32:
@@ -36,7 +31,7 @@ def non_maximum_suppression(boxes: F32, scores: F32, classes: I64, nms_iou: floa
     while len(order):
         best, rest = order[0], order[1:]
         kept.append(int(best))
-        repeats = (box_iou(boxes[best], boxes[rest]) > nms_iou) & (classes[rest] == classes[best])
+        repeats = (image_box_iou(boxes[best], boxes[rest]) > nms_iou) & (classes[rest] == classes[best])
         order = rest[~repeats]
     return np.array(kept, np.int64)
 
@@ -51,9 +46,9 @@ def best_classes(scores: F32, min_score: float) -> tuple[I64, I64, F32]:
     return anchors, classes[anchors], best[anchors].astype(np.float32)
 
 
-def named_boxes(names: Sequence[str], classes: I64, boxes: F32, scores: F32) -> Boxes:
+def named_boxes(names: Sequence[str], classes: I64, boxes: F32, scores: F32) -> NamedBoxes:
     """Boxes (N, 4) of class indices (N,) as named boxes; empty ones (all outside the image) are left out."""
     has_area = np.all(boxes[:, 2:] > boxes[:, :2], axis=1)
     kept_names = tuple(names[i] for i in classes[has_area].tolist())
     clipped = np.clip(scores[has_area], 0, 1).astype(np.float32)
-    return Boxes(kept_names, np.ascontiguousarray(boxes[has_area], np.float32), clipped)
+    return NamedBoxes(kept_names, np.ascontiguousarray(boxes[has_area], np.float32), clipped)

@@ -14,8 +14,9 @@ from pydantic import Field
 
 from placegraph.models_onnx import Masks
 from placegraph.models_onnx.manifest import ModelOptions, Weights
+from placegraph.models_onnx.masks import mask_in_box
 from placegraph.models_onnx.session import Session, Shape
-from placegraph.runtime.arrays import F32, U8
+from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import ModelError
 
 LONG_SIDE = 1024  # px of the longer image side in the encoder's input; SAM
@@ -77,9 +78,7 @@ class FAMILY:
             feed = np.ascontiguousarray(square.transpose(2, 0, 1)[None])
         return np.asarray(self._encoder.run({self._input: feed})[self._embedding], np.float32)
 
-    def _decode(
-        self, embedding: F32, box_px: F32, scales: F32, size: tuple[int, int]
-    ) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def _decode(self, embedding: F32, box_px: F32, scales: F32, size: tuple[int, int]) -> Bool:
         """One box (4,) px to its mask (H, W): of the masks offered, that with the best predicted IoU."""
         corners = (box_px.reshape(2, 2) * scales).astype(np.float32)
         # The padding point (label -1) is part of the published use; with it, three points make exports that choose
@@ -104,14 +103,12 @@ class FAMILY:
         return upscale(np.asarray(low[best], np.float32), scales, size)
 
 
-def upscale(low: F32, scales: F32, size: tuple[int, int]) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def upscale(low: F32, scales: F32, size: tuple[int, int]) -> Bool:
     """Low-resolution logits (256, 256) of the padded square to a mask (H, W) of the image: positive inside.
 
     Not as in SAM: one bilinear step from the logits instead of two through the 1024 px square. The export's own `masks`
     are not used, because tracing freezes the crop of some exports to the aspect of the image they were traced with.
     """
     cells = scales * (LOW_RES / LONG_SIDE)  # low-resolution cells per px of the image
-    to_cell = np.array([[cells[0], 0, 0.5 * cells[0] - 0.5], [0, cells[1], 0.5 * cells[1] - 0.5]], np.float64)
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    logits = cv2.warpAffine(low, to_cell, (size[1], size[0]), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(logits > 0)
+    whole_px = np.array([0, 0, size[1], size[0]], np.float32)
+    return mask_in_box(low, cells, 0.5 * cells - 0.5, whole_px, size)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from placegraph.models_onnx import Boxes, Instances, Masks, ScoredNames
-from placegraph.models_onnx.boxes import box_iou
+from placegraph.models_onnx import Instances, Masks, NamedBoxes, ScoredNames
+from placegraph.models_onnx.boxes import image_box_iou
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.runtime.arrays import F32, U8, Bool
@@ -66,14 +66,14 @@ class FAMILY:
                     score = float(confidence[mask].mean(dtype=np.float64))
                     pieces_found.append((score, self._labels[label], [x, y, x + width, y + height], mask))
         pieces_found.sort(key=lambda item: -item[0])  # stable: equal scores stay in order of class, then of first row
-        boxes = Boxes(
+        boxes = NamedBoxes(
             names=tuple(name for _, name, _, _ in pieces_found),
             boxes_px=np.array([box for _, _, box, _ in pieces_found], np.float32).reshape(-1, 4),
             scores=np.array([score for score, _, _, _ in pieces_found], np.float32),
         )
         return Instances(boxes, [mask for _, _, _, mask in pieces_found])
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
         return self.instances(image, names).boxes
 
@@ -96,7 +96,7 @@ class FAMILY:
         empty = np.zeros(image.shape[:2], bool)
         masks: Masks = []
         for box in boxes_px:
-            overlap = box_iou(box, pieces.boxes.boxes_px)
+            overlap = image_box_iou(box, pieces.boxes.boxes_px)
             best = int(overlap.argmax()) if len(overlap) else -1
             masks.append(pieces.masks[best] if best >= 0 and overlap[best] > 0 else empty)
         return masks

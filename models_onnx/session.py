@@ -78,15 +78,16 @@ class Session:
 
     def only_input(self) -> str:
         """Name of the single input; raises ModelError when the file has more or none."""
-        if len(self.inputs) != 1:
-            raise ModelError(f"{self.path}: expected one input, there are: {_listing(self.inputs)}")
-        return next(iter(self.inputs))
+        return self._only("input", self.inputs)
 
     def only_output(self) -> str:
         """Name of the single output; raises ModelError when the file has more or none."""
-        if len(self.outputs) != 1:
-            raise ModelError(f"{self.path}: expected one output, there are: {_listing(self.outputs)}")
-        return next(iter(self.outputs))
+        return self._only("output", self.outputs)
+
+    def _only(self, kind: str, shapes: dict[str, Shape]) -> str:
+        if len(shapes) != 1:
+            raise ModelError(f"{self.path}: expected one {kind}, there are: {_listing(shapes)}")
+        return next(iter(shapes))
 
     def run(self, feeds: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         """Feed arrays by input name; returns every output by name.

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes, boxes
+from placegraph.models_onnx import NamedBoxes, boxes
 from placegraph.models_onnx.letterbox import Letterbox, letterbox_image
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
@@ -29,7 +29,7 @@ class Options(ModelOptions):
 
 
 class FAMILY:
-    """A YOLO network as a Detector: of its own classes, or of the names prompts for when the export takes text."""
+    """A YOLO network as a Detector: of its own classes, or of the names asked for when the export takes text."""
 
     def __init__(self, weights: Weights, threads: int = 1) -> None:
         """Load and check the layout; raises ModelError when it is not such an export."""
@@ -48,8 +48,8 @@ class FAMILY:
             self._labels = weights.class_names()
             self._session.expect(outputs={self._output: (1, 4 + len(self._labels), "A")})
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
-        """Boxes of the names prompts for (prompted), or of the network's own classes (`names` ignored).
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
+        """Boxes of the names asked for (prompted), or of the network's own classes (`names` ignored).
 
         Raises:
             ModelError: the network cannot be run on this image, or gives another number of classes than names.
@@ -65,10 +65,10 @@ class FAMILY:
             centres.append(raw[anchors, :4])
             classes.append(part + start)
             scores.append(best)
-        found = placed.to_image(boxes.corners_from_centres(np.concatenate(centres)))
-        which, best = np.concatenate(classes), np.concatenate(scores)
-        kept = boxes.non_maximum_suppression(found, best, which, self._options.nms_iou)
-        return boxes.named_boxes(prompts, which[kept], found[kept], best[kept])
+        boxes_px = placed.to_image(boxes.corners_from_centres(np.concatenate(centres)))
+        class_ids, best = np.concatenate(classes), np.concatenate(scores)
+        kept = boxes.non_maximum_suppression(boxes_px, best, class_ids, self._options.nms_iou)
+        return boxes.named_boxes(prompts, class_ids[kept], boxes_px[kept], best[kept])
 
     def _run(self, feed: F32, names: Sequence[str]) -> F32:
         """One pass for as many names as the export takes: (A, 4 + names)."""

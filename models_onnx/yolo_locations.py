@@ -30,5 +30,5 @@ class FAMILY:
         Raises:
             ModelError: the network cannot be run on this image.
         """
-        found = self._network.instances(image, ())
-        return ScoredMasks(found.masks, found.boxes.scores)
+        instances = self._network.instances(image, ())
+        return ScoredMasks(instances.masks, instances.boxes.scores)

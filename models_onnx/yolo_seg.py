@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from placegraph.models_onnx import Boxes, Instances, Masks, boxes
+from placegraph.models_onnx import Instances, Masks, NamedBoxes, boxes
 from placegraph.models_onnx.letterbox import Letterbox
 from placegraph.models_onnx.manifest import ModelOptions, Weights
+from placegraph.models_onnx.masks import mask_in_box
 from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.yolo import input_size, prepare_input
-from placegraph.runtime.arrays import F32, U8
+from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import ModelError
 
 
@@ -66,10 +66,10 @@ class FAMILY:
             ModelError: the network cannot be run on this image.
         """
         raw = self._run(image)
-        found, anchors = self._detections(raw)
-        return Instances(found, [self._mask(raw, raw.coefficients[i], raw.boxes_px[i]) for i in anchors])
+        detections, anchors = self._detections(raw)
+        return Instances(detections, [self._mask(raw, raw.coefficients[i], raw.boxes_px[i]) for i in anchors])
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
         return self._detections(self._run(image))[0]
 
@@ -87,7 +87,7 @@ class FAMILY:
         certainty = raw.scores.max(axis=1)
         masks: Masks = []
         for box in boxes_px:
-            overlap = boxes.box_iou(box, raw.boxes_px)
+            overlap = boxes.image_box_iou(box, raw.boxes_px)
             fitness = np.where(overlap >= self._options.prompt_iou, overlap * certainty, -1)
             best = int(fitness.argmax()) if len(fitness) else -1
             if best < 0 or fitness[best] < 0:
@@ -109,39 +109,28 @@ class FAMILY:
             placed,
         )
 
-    def _detections(self, raw: _Raw) -> tuple[Boxes, list[int]]:
+    def _detections(self, raw: _Raw) -> tuple[NamedBoxes, list[int]]:
         """Named boxes and the anchor of each."""
         anchors, classes, scores = boxes.best_classes(raw.scores, self._options.min_score)
         solid = np.all(raw.boxes_px[anchors, 2:] > raw.boxes_px[anchors, :2], axis=1)
         anchors, classes, scores = anchors[solid], classes[solid], scores[solid]
-        found = raw.boxes_px[anchors]
-        kept = boxes.non_maximum_suppression(found, scores, classes, self._options.nms_iou)[: self._options.max_objects]
-        return boxes.named_boxes(self._labels, classes[kept], found[kept], scores[kept]), anchors[kept].tolist()
+        boxes_px = raw.boxes_px[anchors]
+        kept = boxes.non_maximum_suppression(boxes_px, scores, classes, self._options.nms_iou)
+        kept = kept[: self._options.max_objects]
+        return boxes.named_boxes(self._labels, classes[kept], boxes_px[kept], scores[kept]), anchors[kept].tolist()
 
-    def _mask(self, raw: _Raw, coefficients: F32, box_px: F32) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def _mask(self, raw: _Raw, coefficients: F32, box_px: F32) -> Bool:
         """Coefficients (M,) to a mask (H, W) of the image, cut to a box in px.
 
         Not as in the export's reference code, which resizes to the input and then to the image: the logits are resized
         to the image in one bilinear step and only inside the box. Their sign is the sigmoid's threshold at .5.
         """
         placed, (_, rows, columns) = raw.placed, raw.prototypes.shape
-        mask = np.zeros((placed.height, placed.width), bool)
-        x0, y0 = (max(int(v), 0) for v in np.floor(box_px[:2] + 0.5))
-        x1, y1 = (min(int(v), limit) for v, limit in zip(np.floor(box_px[2:] + 0.5), mask.shape[::-1], strict=True))
-        if x1 <= x0 or y1 <= y0:
-            return mask
         logits = np.tensordot(coefficients, raw.prototypes, axes=1).astype(np.float32)
-        step_x, step_y = columns / self._width, rows / self._height  # prototype cells per px of the input
-        to_cell = np.array(
-            [
-                [placed.scale_x * step_x, 0, ((x0 + 0.5) * placed.scale_x + placed.pad_x) * step_x - 0.5],
-                [0, placed.scale_y * step_y, ((y0 + 0.5) * placed.scale_y + placed.pad_y) * step_y - 0.5],
-            ]
-        )
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        inside = cv2.warpAffine(logits, to_cell, (x1 - x0, y1 - y0), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        mask[y0:y1, x0:x1] = inside > 0
-        return mask
+        cells = np.array([columns / self._width, rows / self._height])  # prototype cells per px of the input
+        scale = np.array([placed.scale_x, placed.scale_y])
+        offset = (0.5 * scale + (placed.pad_x, placed.pad_y)) * cells - 0.5
+        return mask_in_box(logits, scale * cells, offset, box_px, (placed.height, placed.width))
 
 
 def _output_names(session: Session) -> tuple[str, str]:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes, boxes
+from placegraph.models_onnx import NamedBoxes, boxes
 from placegraph.models_onnx.letterbox import letterbox_image
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
@@ -44,7 +44,7 @@ class FAMILY:
         self._height, self._width = height, width
         self._cells, self._strides = _grid(height, width)
 
-    def detect(self, image: U8, names: Sequence[str]) -> Boxes:
+    def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
         canvas, placed = letterbox_image(image, self._height, self._width, centred=False)
         feed = canvas[:, :, ::-1].astype(np.float32).transpose(2, 0, 1)[None]
@@ -52,9 +52,9 @@ class FAMILY:
         if len(raw) != len(self._cells):
             raise ModelError(f"{self._session.path}: {len(raw)} anchors, expected {len(self._cells)} of {STRIDES}")
         anchors, classes, scores = boxes.best_classes(raw[:, 4:5] * raw[:, 5:], self._options.min_score)
-        found = placed.to_image(boxes.corners_from_centres(self._decode(raw[anchors, :4], anchors)))
-        kept = boxes.non_maximum_suppression(found, scores, classes, self._options.nms_iou)
-        return boxes.named_boxes(self._labels, classes[kept], found[kept], scores[kept])
+        boxes_px = placed.to_image(boxes.corners_from_centres(self._decode(raw[anchors, :4], anchors)))
+        kept = boxes.non_maximum_suppression(boxes_px, scores, classes, self._options.nms_iou)
+        return boxes.named_boxes(self._labels, classes[kept], boxes_px[kept], scores[kept])
 
     def _decode(self, raw: F32, anchors: I64) -> F32:
         """Grid offsets and log sizes (K, 4) to cx cy w h in px of the input."""

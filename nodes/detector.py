@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from placegraph.models_onnx import Detector
-from placegraph.models_onnx.load import load, wrong_task
+from placegraph.models_onnx.load import load_for_node
 from placegraph.runtime.messages import Detections, Keyframe, Message, Tags
 from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Node, NodeConfig
@@ -30,43 +29,25 @@ class DetectorNode(Node):
     Source: paper, object layer: YOLO-World prompted with the tags.
     """
 
-    config_type: ClassVar[type[NodeConfig]] = DetectorConfig
+    config_type = DetectorConfig
     inputs = (Keyframe, Tags)
     outputs = (Detections,)
-    restartable: ClassVar[bool] = True
+    restartable = True
 
     def start(self) -> None:
-        """Load the network.
-
-        Raises:
-            ModelError: its weights are absent, damaged, or not of the family's layout.
-            ConfigError: it does not detect objects.
-        """
-        model = load(self.config.model, self.context.model_dirs, self.context.threads)
-        if not isinstance(model, Detector):
-            raise wrong_task("detector", self.config.model, model, "find boxes")
-        self._model: Detector = model
+        """Load the network; raises ModelError, ConfigError."""
+        self._model = load_for_node(Detector, self.config.model, "detector", self.context)
         self._synchronizer = FrameSynchronizer(Keyframe, Tags)
 
     def step(self, message: Message) -> Sequence[Message]:
         """When both a Keyframe and its Tags are there, give its Detections, best first."""
         match self._synchronizer.add(message):
             case (Keyframe() as keyframe, Tags() as tags):
-                return [self._detect(keyframe, tags)]
+                names = tuple(dict.fromkeys((*tags.names, *self.config.vocabulary)))
+                boxes = self._model.detect(keyframe.color, names)
+                return [boxes.best(self.config.min_score, self.config.max_objects).as_message(keyframe)]
             case _:
                 return []
-
-    def _detect(self, keyframe: Keyframe, tags: Tags) -> Detections:
-        names = tuple(dict.fromkeys((*tags.names, *self.config.vocabulary)))
-        boxes = self._model.detect(keyframe.color, names)
-        kept = np.flatnonzero(boxes.scores >= self.config.min_score)[: self.config.max_objects]
-        return Detections(
-            frame_id=keyframe.frame_id,
-            stamp_ns=keyframe.stamp_ns,
-            names=tuple(boxes.names[i] for i in kept.tolist()),
-            boxes_px=np.ascontiguousarray(boxes.boxes_px[kept], np.float32),
-            scores=np.ascontiguousarray(boxes.scores[kept], np.float32),
-        )
 
 
 NODE = DetectorNode

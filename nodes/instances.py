@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from placegraph.models_onnx import InstanceSegmenter
-from placegraph.models_onnx.load import load, wrong_task
-from placegraph.models_onnx.segments import pack_segments
+from placegraph.models_onnx.load import load_for_node
+from placegraph.models_onnx.masks import pack_segments
 from placegraph.runtime.messages import Detections, Keyframe, Message, Segments
 from placegraph.runtime.node import Node, NodeConfig
 
@@ -30,39 +29,23 @@ class InstancesNode(Node):
     Not as in the paper, which runs three networks: for machines that are too small for them.
     """
 
-    config_type: ClassVar[type[NodeConfig]] = InstancesConfig
+    config_type = InstancesConfig
     inputs = (Keyframe,)
     outputs = (Detections, Segments)
-    restartable: ClassVar[bool] = True
+    restartable = True
 
     def start(self) -> None:
-        """Load the network.
-
-        Raises:
-            ModelError: its weights are absent, damaged, or not of the family's layout.
-            ConfigError: it does not give boxes with masks.
-        """
-        model = load(self.config.model, self.context.model_dirs, self.context.threads)
-        if not isinstance(model, InstanceSegmenter):
-            raise wrong_task("instances", self.config.model, model, "give boxes with masks in one pass")
-        self._model: InstanceSegmenter = model
+        """Load the network; raises ModelError, ConfigError."""
+        self._model = load_for_node(InstanceSegmenter, self.config.model, "instances", self.context)
 
     def step(self, message: Message) -> Sequence[Message]:
         """A Keyframe gives its Detections and its Segments, best first."""
         if not isinstance(message, Keyframe):
             raise TypeError(f"instances takes Keyframe, not {type(message).__name__}")
         instances = self._model.instances(message.color, self.config.vocabulary)
-        kept = np.flatnonzero(instances.boxes.scores >= self.config.min_score)[: self.config.max_objects]
-        names = tuple(instances.boxes.names[i] for i in kept.tolist())
-        scores = np.ascontiguousarray(instances.boxes.scores[kept], np.float32)
-        detections = Detections(
-            frame_id=message.frame_id,
-            stamp_ns=message.stamp_ns,
-            names=names,
-            boxes_px=np.ascontiguousarray(instances.boxes.boxes_px[kept], np.float32),
-            scores=scores,
-        )
-        return [detections, pack_segments(message, names, scores, [instances.masks[i] for i in kept.tolist()])]
+        instances = instances.best(self.config.min_score, self.config.max_objects)
+        boxes = instances.boxes
+        return [boxes.as_message(message), pack_segments(message, boxes.names, boxes.scores, instances.masks)]
 
 
 NODE = InstancesNode

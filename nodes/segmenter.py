@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
-import numpy as np
 from pydantic import Field
 
-from placegraph.models_onnx import Segmenter
-from placegraph.models_onnx.load import load, wrong_task
-from placegraph.models_onnx.segments import pack_segments
+from placegraph.models_onnx import NamedBoxes, Segmenter
+from placegraph.models_onnx.load import load_for_node
+from placegraph.models_onnx.masks import pack_segments
 from placegraph.runtime.messages import Detections, Keyframe, Message, Segments
 from placegraph.runtime.messages.synchronizer import FrameSynchronizer
 from placegraph.runtime.node import Node, NodeConfig
@@ -30,22 +28,14 @@ class SegmenterNode(Node):
     Source: paper, object layer: MobileSAMv2 prompted with the boxes.
     """
 
-    config_type: ClassVar[type[NodeConfig]] = SegmenterConfig
+    config_type = SegmenterConfig
     inputs = (Keyframe, Detections)
     outputs = (Segments,)
-    restartable: ClassVar[bool] = True
+    restartable = True
 
     def start(self) -> None:
-        """Load the network.
-
-        Raises:
-            ModelError: its weights are absent, damaged, or not of the family's layout.
-            ConfigError: it does not segment boxes.
-        """
-        model = load(self.config.model, self.context.model_dirs, self.context.threads)
-        if not isinstance(model, Segmenter):
-            raise wrong_task("segmenter", self.config.model, model, "give masks for boxes")
-        self._model: Segmenter = model
+        """Load the network; raises ModelError, ConfigError."""
+        self._model = load_for_node(Segmenter, self.config.model, "segmenter", self.context)
         self._synchronizer = FrameSynchronizer(Keyframe, Detections)
 
     def step(self, message: Message) -> Sequence[Message]:
@@ -57,10 +47,10 @@ class SegmenterNode(Node):
                 return []
 
     def _segment(self, keyframe: Keyframe, detections: Detections) -> Segments:
-        kept = np.flatnonzero(detections.scores >= self.config.min_score)[: self.config.max_objects]
-        depth_m = keyframe.depth_m
-        masks = self._model.segment(keyframe.color, depth_m, detections.boxes_px[kept])
-        return pack_segments(keyframe, [detections.names[i] for i in kept.tolist()], detections.scores[kept], masks)
+        boxes = NamedBoxes(detections.names, detections.boxes_px, detections.scores)
+        boxes = boxes.best(self.config.min_score, self.config.max_objects)
+        masks = self._model.segment(keyframe.color, keyframe.depth_m, boxes.boxes_px)
+        return pack_segments(keyframe, boxes.names, boxes.scores, masks)
 
 
 NODE = SegmenterNode

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -21,28 +21,27 @@ from placegraph.runtime.node import Context, NodeConfig, Source, available, plug
 DEVICES = ("oak",)
 
 
-class FrameSource(Protocol):
-    """What a module's SOURCE is: a class that reads one format or device."""
+class FrameSource:
+    """Base of what a module exports as SOURCE: a class that reads one format or device."""
 
     summary: ClassVar[str]  # what the folder, file or device must look like
-    live: ClassVar[bool]  # frames come at their own pace and may be lost
+    live: ClassVar[bool] = False  # frames come at their own pace and may be lost
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         """Check path and settings. Raises SourceError, ConfigError."""
-        ...
 
     @staticmethod
     def matches(path: Path) -> bool:
-        """Whether the path looks like this format; cheap, never raises."""
-        ...
+        """Whether the path looks like this format; cheap, never raises. A source without a path matches none."""
+        return False
 
     def frames(self) -> Iterator[Frame]:
         """Frames in order of time, ids counted from 0. Raises SourceError naming the file and what is wrong."""
-        ...
+        raise NotImplementedError
 
     def given_poses(self) -> dict[int, F64] | None:
         """stamp_ns to (4, 4) world_from_camera in metres, for evaluation; None when the source has none."""
-        ...
+        return None
 
 
 class CameraConfig(NodeConfig):

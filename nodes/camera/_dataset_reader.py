@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from placegraph.nodes.camera import FrameSource
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import ConfigError, SourceError
+from placegraph.runtime.messages import Frame
 from placegraph.runtime.vision.geometry import is_rigid
 
 NO_POSE = np.full((4, 4), np.nan)
@@ -26,6 +29,53 @@ class SourceSettings(BaseModel):
 
 
 S = TypeVar("S", bound=SourceSettings)
+
+
+class NumberedFrames(FrameSource):
+    """Base of sources whose frames have a number and no time: numbers are turned into times by a rate."""
+
+    has_z_up: ClassVar[bool] = True  # the world of the poses has z up, so a pose also gives which way is up
+    numbers: Collection[int]  # of the frames, ascending
+    rate_hz: float
+    depth_unit_m: float = 0.001
+
+    def read_images(self, number: int) -> tuple[U8, U16, F64]:
+        """Aligned colour and depth of a frame, and fx fy cx cy in px; raises SourceError."""
+        raise NotImplementedError
+
+    def read_pose(self, number: int) -> F64:
+        """world_from_camera (4, 4) in metres of a frame, NaN where tracking was lost; raises SourceError."""
+        raise NotImplementedError
+
+    def frames(self) -> Iterator[Frame]:
+        """Frames by number. Raises SourceError naming the file that is missing or damaged."""
+        for frame_id, number in enumerate(self.numbers):
+            color, depth, intrinsics = self.read_images(number)
+            pose = self.read_pose(number)
+            yield Frame(
+                frame_id=frame_id,
+                stamp_ns=self._stamp_ns(number),
+                color=color,
+                depth=depth,
+                depth_unit_m=self.depth_unit_m,
+                intrinsics=intrinsics,
+                given_world_from_camera=pose,
+                up_camera=pose[2, :3].copy() if self.has_z_up else NO_UP,  # transpose of the rotation, times z
+            )
+
+    def given_poses(self) -> dict[int, F64]:
+        """stamp_ns to (4, 4) world_from_camera in metres, for every frame that was tracked. Raises SourceError."""
+        poses = {self._stamp_ns(number): self.read_pose(number) for number in self.numbers}
+        return {stamp: pose for stamp, pose in poses.items() if np.isfinite(pose).all()}
+
+    def _stamp_ns(self, number: int) -> int:
+        return round(number * 1e9 / self.rate_hz)
+
+
+def check_folder(path: Path) -> None:
+    """Raise SourceError unless `path` is a folder."""
+    if not path.is_dir():
+        raise SourceError(f"{path}: no such folder")
 
 
 def read_settings(kind: type[S], settings: dict[str, Any]) -> S:

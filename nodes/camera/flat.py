@@ -5,7 +5,6 @@ Nothing is read from disk. Equal settings give equal bytes: all noise comes from
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -15,9 +14,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.nodes.camera import _flat_scene as scene
-from placegraph.nodes.camera._dataset_reader import SourceSettings, read_settings
+from placegraph.nodes.camera._dataset_reader import NumberedFrames, SourceSettings, read_settings
 from placegraph.runtime.arrays import F32, F64, I64, U8, U16
-from placegraph.runtime.messages import Frame
 
 FOCAL_PER_WIDTH = 0.7  # 71 degrees across, near the 69 of an OAK-D's colour camera
 MIN_RANGE_M, MAX_RANGE_M = 0.3, 6.0  # readings outside are dropped, as small stereo cameras do
@@ -52,15 +50,15 @@ class SceneBoxes:
     object: I64
 
 
-class Flat:
+class Flat(NumberedFrames):
     """Frames of the drawn flat."""
 
     summary: ClassVar[str] = "no path: two rooms drawn by code (source = 'flat')"
-    live: ClassVar[bool] = False
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self.settings = read_settings(Settings, settings)
         self.poses = scene.camera_poses(self.settings.frames or scene.sample_walk()[1])
+        self.numbers, self.rate_hz = range(len(self.poses)), self.settings.rate_hz
         width, height = self.settings.width, self.settings.height
         focal = FOCAL_PER_WIDTH * width
         self.intrinsics = np.array([focal, focal, (width - 1) / 2, (height - 1) / 2])
@@ -69,30 +67,14 @@ class Flat:
         self._rays = np.stack((x, y, np.ones_like(x)), axis=-1).astype(np.float32)  # camera frame, z = 1
         self._boxes = _boxes(self.settings.seed)
 
-    @staticmethod
-    def matches(path: Path) -> bool:
-        """Never: the flat has no path."""
-        return False
+    def read_images(self, number: int) -> tuple[U8, U16, F64]:
+        """The rendered images of a frame."""
+        color, depth, _ = self.render(number)
+        return color, depth, self.intrinsics.copy()
 
-    def frames(self) -> Iterator[Frame]:
-        """Frames along the walk."""
-        for frame_id in range(len(self.poses)):
-            color, depth, _ = self.render(frame_id)
-            pose = self.poses[frame_id].copy()
-            yield Frame(
-                frame_id=frame_id,
-                stamp_ns=self._stamp_ns(frame_id),
-                color=color,
-                depth=depth,
-                depth_unit_m=0.001,
-                intrinsics=self.intrinsics.copy(),
-                given_world_from_camera=pose,
-                up_camera=pose[2, :3].copy(),  # transpose of the rotation, times z
-            )
-
-    def given_poses(self) -> dict[int, F64]:
-        """stamp_ns to (4, 4) world_from_camera in metres."""
-        return {self._stamp_ns(i): pose for i, pose in enumerate(self.poses)}
+    def read_pose(self, number: int) -> F64:
+        """The camera's pose on the walk."""
+        return np.array(self.poses[number])
 
     def render(self, frame_id: int) -> tuple[U8, U16, U8]:
         """Colour (H, W, 3) sRGB, depth (H, W) in mm (0 = no reading) and class (H, W), an index into CLASSES."""
@@ -106,19 +88,6 @@ class Flat:
         measured[(measured < MIN_RANGE_M) | (measured > MAX_RANGE_M)] = 0
         depth = np.round(measured * 1000).astype(np.uint16)
         return np.clip(np.round(color), 0, 255).astype(np.uint8), depth, self._boxes.label[box]
-
-    def _stamp_ns(self, frame_id: int) -> int:
-        return round(frame_id * 1e9 / self.settings.rate_hz)
-
-
-def truth() -> list[tuple[str, F64]]:
-    """Every object of the scene: its class and box (2, 3), min and max in metres, world frame."""
-    return [(drawn.name, drawn.box) for drawn in scene.OBJECTS]
-
-
-def rooms() -> list[tuple[str, F64]]:
-    """Every room of the scene: its name and box (2, 3), min and max in metres, world frame."""
-    return [(name, np.array(span).reshape(2, 3)) for name, span in scene.ROOMS]
 
 
 def _boxes(seed: int) -> SceneBoxes:

@@ -18,14 +18,8 @@ import depthai as dai
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._dataset_reader import (
-    NO_POSE,
-    NO_UP,
-    SourceSettings,
-    check_centre,
-    check_intrinsics,
-    read_settings,
-)
+from placegraph.nodes.camera import FrameSource
+from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
 from placegraph.runtime.messages import Frame
@@ -36,7 +30,7 @@ SYNC_S = 0.033  # colour and depth belong together within half a frame at 15 Hz
 ACCELEROMETER_HZ = 100
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of an OAK camera."""
 
     device: str = ""  # id, name or address; "": the only one connected
@@ -47,19 +41,14 @@ class Settings(SourceSettings):
     gravity_time_s: float = Field(1.0, gt=0)  # time constant of the low pass on the accelerometer
 
 
-class Oak:
+class Oak(FrameSource):
     """Frames of one camera until it is lost or the run ends."""
 
     summary: ClassVar[str] = "no path: an OAK camera with stereo depth (source = 'oak')"
     live: ClassVar[bool] = True
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
-
-    @staticmethod
-    def matches(path: Path) -> bool:
-        """Never: a device has no path."""
-        return False
+        self._settings = reader.read_settings(Settings, settings)
 
     def frames(self) -> Iterator[Frame]:
         """Frames as they come. Raises SourceError when no camera is found, it cannot be opened, or it is lost."""
@@ -82,14 +71,10 @@ class Oak:
                     raise SourceError(f"OAK camera {info.deviceId}: no frame for {SILENCE_S:g} s")
                 if motion is not None:
                     _read_motion(motion, gravity)
-                up = NO_UP if camera_from_imu is None else camera_from_imu @ gravity.up()
+                up = reader.NO_UP if camera_from_imu is None else camera_from_imu @ gravity.up()
                 yield read_group(group["rgb"], group["depth"], frame_id, up)
                 frame_id += 1
             raise SourceError(f"OAK camera {info.deviceId}: lost (unplugged, or its pipeline stopped)")
-
-    def given_poses(self) -> dict[int, F64] | None:
-        """None: a camera does not know where it is."""
-        return None
 
 
 @dataclass
@@ -115,9 +100,9 @@ class Gravity:
     def up(self) -> F64:
         """Unit vector (3,) in the sensor's frame; NaN until half a time constant of samples is in."""
         if self._mean is None or (self._last_ns - self._first_ns) * 1e-9 < self.time_constant_s / 2:
-            return NO_UP
+            return reader.NO_UP
         length = float(np.linalg.norm(self._mean))
-        return self._mean / length if length > 1.0 else NO_UP  # free fall: no direction
+        return self._mean / length if length > 1.0 else reader.NO_UP  # free fall: no direction
 
 
 def find_device(identifier: str) -> dai.DeviceInfo:
@@ -183,8 +168,8 @@ def to_frame(color: U8, depth: U16, matrix: F64, stamp_ns: int, frame_id: int, u
             f"OAK camera, frame {frame_id}: depth is {depth.dtype} {depth.shape}, expected uint16 {color.shape[:2]}"
         )
     where = f"OAK camera, frame {frame_id}: intrinsics"
-    intrinsics = check_intrinsics(np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]), where)
-    check_centre(intrinsics, depth.shape, where)
+    intrinsics = reader.check_intrinsics(np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]), where)
+    reader.check_centre(intrinsics, depth.shape, where)
     return Frame(
         frame_id=frame_id,
         stamp_ns=stamp_ns,
@@ -192,7 +177,7 @@ def to_frame(color: U8, depth: U16, matrix: F64, stamp_ns: int, frame_id: int, u
         depth=depth,
         depth_unit_m=0.001,
         intrinsics=intrinsics,
-        given_world_from_camera=NO_POSE,
+        given_world_from_camera=reader.NO_POSE,
         up_camera=np.asarray(up_camera, float),
     )
 

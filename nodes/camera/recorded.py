@@ -8,17 +8,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from placegraph.nodes.camera import FrameSource
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import Frame
 from placegraph.runtime.recording import kinds_in, read
 
 
-class RecordedFrames:
+class RecordedFrames(FrameSource):
     """The recorded Frames, exact, with their ids and capture times."""
 
     summary: ClassVar[str] = "a recording FILE.rrd made with [nodes.recorder] frames = true"
-    live: ClassVar[bool] = False
 
     @staticmethod
     def matches(path: Path) -> bool:

@@ -10,32 +10,22 @@ Replica's meshes, z up, so a pose also gives which way is up. Frames carry no ti
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
-from placegraph.nodes.camera._dataset_reader import (
-    SourceSettings,
-    check_centre,
-    check_same_frames,
-    numbered_files,
-    read_color_and_depth,
-    read_settings,
-    read_text,
-)
-from placegraph.runtime.arrays import F64
+from placegraph.nodes.camera import _dataset_reader as reader
+from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
-from placegraph.runtime.messages import Frame
 from placegraph.runtime.vision.geometry import is_rigid
 
 COLOR, DEPTH = re.compile(r"frame(\d+)\.jpg"), re.compile(r"depth(\d+)\.png")
 CAMERA, TRACK = "cam_params.json", "traj.txt"
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of a Replica scene."""
 
     rate_hz: float = Field(30.0, gt=0)  # frame numbers are turned into times with it; no rate is published
@@ -59,26 +49,27 @@ class CameraFile(BaseModel, frozen=True):
     camera: Pinhole
 
 
-class Replica:
+class Replica(reader.NumberedFrames):
     """Frames of one scene."""
 
     summary: ClassVar[str] = (
         "a Replica scene of NICE-SLAM: results/frame000000.jpg, results/depth000000.png, traj.txt; "
         "cam_params.json in it or beside it"
     )
-    live: ClassVar[bool] = False
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
-        if not path.is_dir():
-            raise SourceError(f"{path}: no such folder")
+        self._settings = reader.read_settings(Settings, settings)
+        reader.check_folder(path)
+        self.rate_hz = self._settings.rate_hz
         images = path / "results"
-        self._colors, self._depths = numbered_files(images, COLOR), numbered_files(images, DEPTH)
+        self.numbers = self._colors = reader.numbered_files(images, COLOR)
+        self._depths = reader.numbered_files(images, DEPTH)
         if not self._colors:
             raise SourceError(f"{images}: no frame*.jpg")
-        check_same_frames({"colour": self._colors, "depth": self._depths})
+        reader.check_same_frames({"colour": self._colors, "depth": self._depths})
         self._camera_file = path / CAMERA if (path / CAMERA).exists() else path.absolute().parent / CAMERA
         self._camera = _read_camera(self._camera_file)
+        self.depth_unit_m = 1.0 / self._camera.scale
         self._track = _read_track(path / TRACK)
         last = max(self._colors)
         if last >= len(self._track):
@@ -89,39 +80,25 @@ class Replica:
         """Whether the folder holds traj.txt and a folder `results`."""
         return (path / TRACK).is_file() and (path / "results").is_dir()
 
-    def frames(self) -> Iterator[Frame]:
-        """Frames by number. Raises SourceError naming the file that is missing or damaged."""
+    def read_images(self, number: int) -> tuple[U8, U16, F64]:
+        """Images of a frame; raises SourceError also where they are not of the size that cam_params.json says."""
+        color, depth = reader.read_color_and_depth(self._colors[number], self._depths[number])
         camera = self._camera
+        if depth.shape != (camera.h, camera.w):
+            size = f"{depth.shape[1]}x{depth.shape[0]}"
+            raise SourceError(f"{self._colors[number]}: is {size}; {self._camera_file} says {camera.w}x{camera.h}")
         intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-        check_centre(intrinsics, (camera.h, camera.w), str(self._camera_file))
-        for frame_id, (number, color_path) in enumerate(self._colors.items()):
-            color, depth = read_color_and_depth(color_path, self._depths[number])
-            if depth.shape != (camera.h, camera.w):
-                size = f"{depth.shape[1]}x{depth.shape[0]}"
-                raise SourceError(f"{color_path}: is {size}; {self._camera_file} says {camera.w}x{camera.h}")
-            pose = self._track[number]
-            yield Frame(
-                frame_id=frame_id,
-                stamp_ns=self._stamp_ns(number),
-                color=color,
-                depth=depth,
-                depth_unit_m=1.0 / camera.scale,
-                intrinsics=intrinsics,
-                given_world_from_camera=pose.copy(),
-                up_camera=pose[2, :3].copy(),  # transpose of the rotation, times z
-            )
+        reader.check_centre(intrinsics, depth.shape, str(self._camera_file))
+        return color, depth, intrinsics
 
-    def given_poses(self) -> dict[int, F64]:
-        """stamp_ns to (4, 4) world_from_camera in metres."""
-        return {self._stamp_ns(number): self._track[number] for number in self._colors}
-
-    def _stamp_ns(self, number: int) -> int:
-        return round(number * 1e9 / self._settings.rate_hz)
+    def read_pose(self, number: int) -> F64:
+        """The pose in line `number` of the track."""
+        return self._track[number].copy()
 
 
 def _read_camera(file: Path) -> Pinhole:
     try:
-        return CameraFile.model_validate_json(read_text(file)).camera
+        return CameraFile.model_validate_json(reader.read_text(file)).camera
     except ValidationError as error:
         first = error.errors()[0]
         raise SourceError(f"{file}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}") from None
@@ -130,7 +107,7 @@ def _read_camera(file: Path) -> Pinhole:
 def _read_track(file: Path) -> list[F64]:
     """A (4, 4) world_from_camera in metres for each line."""
     poses = []
-    for number, line in enumerate(read_text(file).splitlines(), 1):
+    for number, line in enumerate(reader.read_text(file).splitlines(), 1):
         try:
             pose = np.array([float(word) for word in line.split()]).reshape(4, 4)
         except ValueError:

@@ -15,7 +15,6 @@ pixels in it, not one of them, and where depth sees a few pixels more than colou
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,20 +22,9 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from placegraph.nodes.camera._dataset_reader import (
-    SourceSettings,
-    check_centre,
-    check_same_frames,
-    numbered_files,
-    read_color,
-    read_depth,
-    read_pinhole,
-    read_pose,
-    read_settings,
-)
-from placegraph.runtime.arrays import F64, U8
+from placegraph.nodes.camera import _dataset_reader as reader
+from placegraph.runtime.arrays import F64, U8, U16
 from placegraph.runtime.errors import SourceError
-from placegraph.runtime.messages import Frame
 
 COLOR, DEPTH, POSE = re.compile(r"(\d+)\.jpg"), re.compile(r"(\d+)\.png"), re.compile(r"(\d+)\.txt")
 # Fields of view of colour and depth are within some percent of each other. SensReader's image_size shrinks images but
@@ -44,70 +32,56 @@ COLOR, DEPTH, POSE = re.compile(r"(\d+)\.jpg"), re.compile(r"(\d+)\.png"), re.co
 MAX_VIEW_RATIO = 1.25
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of a ScanNet scene."""
 
     rate_hz: float = Field(30.0, gt=0)  # frame numbers are turned into times with it; the sensor's rate
 
 
-class ScanNet:
+class ScanNet(reader.NumberedFrames):
     """Frames of one scene."""
 
     summary: ClassVar[str] = (
         "a ScanNet scene that SensReader extracted: color/N.jpg, depth/N.png, pose/N.txt, "
         "intrinsic/intrinsic_color.txt and intrinsic_depth.txt"
     )
-    live: ClassVar[bool] = False
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
-        if not path.is_dir():
-            raise SourceError(f"{path}: no such folder")
-        self._colors = numbered_files(path / "color", COLOR)
+        self._settings = reader.read_settings(Settings, settings)
+        reader.check_folder(path)
+        self.rate_hz = self._settings.rate_hz
+        self.numbers = self._colors = reader.numbered_files(path / "color", COLOR)
         if not self._colors:
             raise SourceError(f"{path / 'color'}: no N.jpg")
-        self._depths, self._poses = numbered_files(path / "depth", DEPTH), numbered_files(path / "pose", POSE)
-        check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
+        self._depths = reader.numbered_files(path / "depth", DEPTH)
+        self._poses = reader.numbered_files(path / "pose", POSE)
+        reader.check_same_frames({"colour": self._colors, "depth": self._depths, "pose": self._poses})
         self._color_file, self._depth_file = (
             path / "intrinsic" / f"intrinsic_{kind}.txt" for kind in ("color", "depth")
         )
-        self._color_intrinsics = read_pinhole(self._color_file, size=4)
-        self._depth_intrinsics = read_pinhole(self._depth_file, size=4)
+        self._color_intrinsics = reader.read_pinhole(self._color_file, size=4)
+        self._depth_intrinsics = reader.read_pinhole(self._depth_file, size=4)
 
     @staticmethod
     def matches(path: Path) -> bool:
         """Whether the folder holds color, depth and pose folders."""
         return all((path / name).is_dir() for name in ("color", "depth", "pose"))
 
-    def frames(self) -> Iterator[Frame]:
-        """Frames by number, of depth's size and pinhole. Raises SourceError naming the file that is wrong."""
-        for frame_id, number in enumerate(self._colors):
-            color, depth = read_color(self._colors[number]), read_depth(self._depths[number])
-            self._check_sizes(self._colors[number], color.shape[:2], depth.shape)
-            pose = read_pose(self._poses[number])
-            yield Frame(
-                frame_id=frame_id,
-                stamp_ns=self._stamp_ns(number),
-                color=reproject_color(color, self._color_intrinsics, self._depth_intrinsics, depth.shape),
-                depth=depth,
-                depth_unit_m=0.001,  # SensReader/python/README.md: depth shift 1000
-                intrinsics=self._depth_intrinsics,
-                given_world_from_camera=pose,
-                up_camera=pose[2, :3].copy(),  # transpose of the rotation, times z
-            )
+    def read_images(self, number: int) -> tuple[U8, U16, F64]:
+        """Images of a frame, of depth's size and pinhole; depth in mm (SensReader's README: depth shift 1000)."""
+        color, depth = reader.read_color(self._colors[number]), reader.read_depth(self._depths[number])
+        self._check_sizes(self._colors[number], color.shape[:2], depth.shape)
+        color = reproject_color(color, self._color_intrinsics, self._depth_intrinsics, depth.shape)
+        return color, depth, self._depth_intrinsics
 
-    def given_poses(self) -> dict[int, F64]:
-        """stamp_ns to (4, 4) world_from_camera in metres, for every frame that was tracked. Raises SourceError."""
-        poses = {self._stamp_ns(number): read_pose(path) for number, path in self._poses.items()}
-        return {stamp: pose for stamp, pose in poses.items() if np.isfinite(pose).all()}
-
-    def _stamp_ns(self, number: int) -> int:
-        return round(number * 1e9 / self._settings.rate_hz)
+    def read_pose(self, number: int) -> F64:
+        """The pose in the frame's file."""
+        return reader.read_pose(self._poses[number])
 
     def _check_sizes(self, color_path: Path, color_size: tuple[int, ...], depth_size: tuple[int, int]) -> None:
         height, width = color_size
-        check_centre(self._depth_intrinsics, depth_size, str(self._depth_file))
-        check_centre(self._color_intrinsics, (height, width), str(self._color_file))
+        reader.check_centre(self._depth_intrinsics, depth_size, str(self._depth_file))
+        reader.check_centre(self._color_intrinsics, (height, width), str(self._color_file))
         view = (self._color_intrinsics[0] / width) / (self._depth_intrinsics[0] / depth_size[1])
         if not 1 / MAX_VIEW_RATIO < view < MAX_VIEW_RATIO:
             raise SourceError(

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from placegraph.nodes.camera import FrameSource
 from placegraph.nodes.camera._dataset_reader import SourceSettings, read_settings
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.messages import Frame
@@ -30,11 +31,10 @@ class Settings(SourceSettings):
     height: int = Field(480, ge=48, le=4096)
 
 
-class Synthetic:
+class Synthetic(FrameSource):
     """Frames of the house."""
 
     summary: ClassVar[str] = "no path: a house made and rendered by code (source = 'synthetic')"
-    live: ClassVar[bool] = False
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         self.settings = read_settings(Settings, settings)
@@ -42,11 +42,6 @@ class Synthetic:
         # casting) that no other node needs. Loaded here so that a missing one is reported before the run starts.
         plugin("placegraph.tools.simulator", "render", "Renderer", "house generator")
         self._generator = plugin("placegraph.tools.simulator", "house_frames", "HouseFrames", "house generator")
-
-    @staticmethod
-    def matches(path: Path) -> bool:
-        """Never: the house has no path."""
-        return False
 
     def frames(self) -> Iterator[Frame]:
         """Frames along the walk."""

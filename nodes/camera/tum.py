@@ -18,16 +18,8 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation, Slerp
 
-from placegraph.nodes.camera._dataset_reader import (
-    NO_POSE,
-    SourceSettings,
-    check_centre,
-    check_intrinsics,
-    read_color_and_depth,
-    read_numbers,
-    read_settings,
-    read_text,
-)
+from placegraph.nodes.camera import FrameSource
+from placegraph.nodes.camera import _dataset_reader as reader
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import Frame
@@ -42,7 +34,7 @@ CAMERAS = {
 CAMERA_IN_NAME = re.compile(r"(?:freiburg|fr)([123])(?!\d)", re.IGNORECASE)
 
 
-class Settings(SourceSettings):
+class Settings(reader.SourceSettings):
     """Settings of a TUM folder."""
 
     max_difference_s: float = Field(0.02, gt=0)  # colour to depth and to the track; the data set's tools
@@ -50,18 +42,16 @@ class Settings(SourceSettings):
     intrinsics: list[float] | None = Field(None, min_length=4, max_length=4)  # fx fy cx cy in px
 
 
-class Tum:
+class Tum(FrameSource):
     """Frames of one sequence."""
 
     summary: ClassVar[str] = (
         "a TUM RGB-D folder: rgb.txt and depth.txt (lines of `time file`); optional groundtruth.txt, calibration.txt"
     )
-    live: ClassVar[bool] = False
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
-        self._settings = read_settings(Settings, settings)
-        if not path.is_dir():
-            raise SourceError(f"{path}: no such folder")
+        self._settings = reader.read_settings(Settings, settings)
+        reader.check_folder(path)
         self._folder = path
         window_ns = round(self._settings.max_difference_s * 1e9)
         colors, color_files = _read_list(path / "rgb.txt")
@@ -89,9 +79,9 @@ class Tum:
     def frames(self) -> Iterator[Frame]:
         """Frames by colour time. Raises SourceError naming the file that is missing or damaged."""
         for frame_id, (stamp_ns, color_path, depth_path) in enumerate(self._pairs):
-            color, depth = read_color_and_depth(color_path, depth_path)
-            check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
-            pose = (self._poses or {}).get(stamp_ns, NO_POSE)
+            color, depth = reader.read_color_and_depth(color_path, depth_path)
+            reader.check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
+            pose = (self._poses or {}).get(stamp_ns, reader.NO_POSE)
             yield Frame(
                 frame_id=frame_id,
                 stamp_ns=stamp_ns,
@@ -110,10 +100,10 @@ class Tum:
     def _read_intrinsics(self) -> tuple[F64, str]:
         if self._settings.intrinsics is not None:
             where = "[nodes.camera.settings] intrinsics"
-            return check_intrinsics(np.array(self._settings.intrinsics), where), where
+            return reader.check_intrinsics(np.array(self._settings.intrinsics), where), where
         file = self._folder / "calibration.txt"
         if file.exists():
-            return check_intrinsics(read_numbers(file, (4,), "fx fy cx cy"), str(file)), str(file)
+            return reader.check_intrinsics(reader.read_numbers(file, (4,), "fx fy cx cy"), str(file)), str(file)
         camera = CAMERA_IN_NAME.search(self._folder.resolve().name)
         if camera is None:
             raise ConfigError(
@@ -148,7 +138,7 @@ def associate(colors_ns: I64, depths_ns: I64, window_ns: int) -> list[tuple[int,
 
 def _rows(file: Path, columns: int, what: str) -> list[list[str]]:
     rows = []
-    for number, line in enumerate(read_text(file).splitlines(), 1):
+    for number, line in enumerate(reader.read_text(file).splitlines(), 1):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue

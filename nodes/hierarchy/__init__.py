@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from placegraph.models_onnx import LocationDetector
-from placegraph.models_onnx.load import load, wrong_task
+from placegraph.models_onnx.load import load_for_node
 from placegraph.nodes.hierarchy.floors import FloorConfig
 from placegraph.nodes.hierarchy.graph_builder import GraphBuilder, LayerConfig
 from placegraph.nodes.hierarchy.locations import LocationConfig
@@ -46,10 +46,7 @@ class HierarchyNode(Node):
         """
         name = self.config.locations.model
         if name:
-            model = load(name, self.context.model_dirs, self.context.threads)
-            if not isinstance(model, LocationDetector):
-                raise wrong_task("hierarchy", name, model, "find locations")
-            self._builder = GraphBuilder(self._layers, model)
+            self._builder = GraphBuilder(self._layers, load_for_node(LocationDetector, name, "hierarchy", self.context))
 
     def step(self, message: Message) -> Sequence[Message]:
         """The Graph of a Map, with the Map's frame and revision."""

@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool
+from placegraph.runtime.vision.features import FeatureConfig, ViewFeatures, extract_features
 from placegraph.runtime.vision.geometry import transform
 from placegraph.runtime.vision.point_to_plane import SurfaceConfig, SurfaceMap, coarse_depth, scan_points
 from placegraph.runtime.vision.registration import (
@@ -25,8 +26,8 @@ from placegraph.runtime.vision.registration import (
     SurfaceMatch,
     inverse_depth_at,
     project,
-    rays,
     register,
+    unproject,
 )
 
 
@@ -55,11 +56,17 @@ class RgbdView:
     gray: U8
     depth_m: F32
     intrinsics: F64
+    feature_config: FeatureConfig
 
     @cached_property
     def coarse_m(self) -> F32:
         """Depth on the grid of surfaces, see `coarse_depth`."""
         return coarse_depth(self.depth_m)
+
+    @cached_property
+    def features(self) -> ViewFeatures:
+        """ORB features, computed for the few views that are remembered or compared with remembered ones."""
+        return extract_features(self.gray, self.depth_m, self.intrinsics, self.feature_config)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +150,7 @@ class FeatureTracker:
         height, width = view.gray.shape
         side = max(8, round(self._config.patch_px * width / 640))  # half of it is the least window that OpenCV takes
         v, u = np.mgrid[side // 2 : height : side, side // 2 : width : side]
-        uv = np.stack((u.ravel(), v.ravel()), axis=1).astype(np.float32)
-        inverse_depth = inverse_depth_at(last.depth_m, uv)
-        uv, z = uv[inverse_depth > 0], 1 / inverse_depth[inverse_depth > 0]
-        xyz = transform(pose, rays(uv, last.intrinsics) * z[:, None])
+        uv, z, xyz = _with_depth(np.stack((u.ravel(), v.ravel()), axis=1).astype(np.float32), last, pose)
         if not len(uv):
             return PointMatches(xyz, uv, z)
         expected = project(xyz, view.intrinsics, guess)
@@ -160,7 +164,7 @@ class FeatureTracker:
         inverse_depth = inverse_depth_at(view.depth_m, self._uv)
         seen = inverse_depth > 1 / self._config.surface.max_depth_m
         z = 1 / inverse_depth[seen]
-        xyz = transform(start_from_camera, rays(self._uv[seen], view.intrinsics) * z[:, None])
+        xyz = transform(start_from_camera, unproject(self._uv[seen], z, view.intrinsics))
         total = self._information[seen] + z**-4.0
         self._xyz[seen] += (xyz - self._xyz[seen]) * (z**-4.0 / total)[:, None]
         self._information[seen] = total
@@ -177,12 +181,16 @@ class FeatureTracker:
         corners = cv2.goodFeaturesToTrack(view.gray, missing, c.corner_quality, distance, mask=free)
         if corners is None:
             return
-        uv = corners.reshape(-1, 2).astype(np.float32)
-        inverse_depth = inverse_depth_at(view.depth_m, uv)
-        uv, z = uv[inverse_depth > 0], 1 / inverse_depth[inverse_depth > 0]
-        xyz = transform(start_from_camera, rays(uv, view.intrinsics) * z[:, None])
+        uv, z, xyz = _with_depth(corners.reshape(-1, 2).astype(np.float32), view, start_from_camera)
         self._uv, self._xyz = np.concatenate((self._uv, uv)), np.concatenate((self._xyz, xyz))
         self._information = np.concatenate((self._information, z**-4.0))
+
+
+def _with_depth(uv: F32, view: RgbdView, start_from_camera: F64) -> tuple[F32, F64, F64]:
+    """Those of pixels (N, 2) that have depth, their depths (M,) in metres and points (M, 3) in the start frame."""
+    inverse_depth = inverse_depth_at(view.depth_m, uv)
+    uv, z = uv[inverse_depth > 0], 1 / inverse_depth[inverse_depth > 0]
+    return uv, z, transform(start_from_camera, unproject(uv, z, view.intrinsics))
 
 
 def _track_points(

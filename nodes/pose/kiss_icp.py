@@ -5,17 +5,16 @@ Source: KISS-ICP (Vizzo 2023), the order of its pipeline. Not as there: each sca
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from kiss_icp.config import KISSConfig
 from kiss_icp.kiss_icp import KissICP
-from pydantic import Field
+from pydantic import BaseModel, Field
 from scipy.spatial import KDTree
 
 from placegraph.nodes.pose.motion_model import extrapolate_motion
+from placegraph.nodes.pose.odometry import DepthPointsConfig, PoseEstimate, depth_points
 from placegraph.runtime.arrays import F32, F64
-from placegraph.runtime.node import NodeConfig
+from placegraph.runtime.messages import Frame
 from placegraph.runtime.vision.geometry import transform
 
 # chosen by hand
@@ -24,38 +23,40 @@ MIN_FIT_OF_OLD_TREE = 0.8  # a worse fit is judged again with a tree of the whol
 MAX_JUDGED_POINTS = 1000
 
 
-class KissIcpConfig(NodeConfig):
+class KissIcpConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """Values for an indoor depth camera, chosen on 7-Scenes (docs/results.md)."""
 
-    min_range_m: float = 0.2
-    max_range_m: float = 6.0
-    voxel_m: float = Field(0.1, gt=0)
+    voxel_m: float = Field(default=0.1, gt=0)
     max_points_per_voxel: int = 20
     initial_threshold_m: float = 0.3  # KISS-ICP's 2.0 is for cars
     min_motion_m: float = 0.02
     min_points: int = 200  # with fewer, the lens is covered or a white wall too near
     min_quality: float = 0.25  # share of the scan that must lie on the map; a step through a doorway leaves a third
-    relock_quality: float = 0.7  # min_quality after a lost track: a wrong place fits halfway, too
+    min_quality_after_loss: float = 0.7  # instead, after a lost track: a wrong place fits halfway, too
     max_innovation_m: float = 0.3  # in one frame, from constant motion; a hand-held camera changes its motion by less
-    seed: int = 0
 
 
 class KissIcpOdometry:
     """Poses of successive scans; a scan that does not fit the local map is reported and left out of it."""
 
-    def __init__(self, config: KissIcpConfig, threads: int) -> None:
-        self._config = config
-        self._kiss = KissICP(_kiss_config(config, threads))
+    def __init__(self, config: KissIcpConfig, points_config: DepthPointsConfig, threads: int) -> None:
+        self._config, self._points_config = config, points_config
+        self._kiss = KissICP(_kiss_config(config, points_config, threads))
         self._tree: KDTree | None = None
         self._tree_age = 0  # frames put into the map since the tree was built
         self._is_lost = False
         self._stamp_ns: int | None = None
         self._delta_span_ns = 0  # time between the two frames of `last_delta`
-        self._random = np.random.default_rng(config.seed)
+        self._random = np.random.default_rng(points_config.seed)
 
-    def register(self, points: F32, stamp_ns: int) -> dict[str, Any]:
-        """Fields of the Pose for one scan, (N, 3) metres, camera frame; the start frame is the first camera."""
-        span_ns, self._stamp_ns = stamp_ns - (self._stamp_ns or stamp_ns), stamp_ns
+    def estimate(self, frame: Frame, depth_m: F32) -> PoseEstimate:
+        """The pose of the next frame."""
+        return self.register(depth_points(depth_m, frame.intrinsics, self._points_config), frame.stamp_ns)
+
+    def register(self, points: F32, stamp_ns: int) -> PoseEstimate:
+        """The pose of the next scan, (N, 3) metres, camera frame."""
+        span_ns = 0 if self._stamp_ns is None else stamp_ns - self._stamp_ns
+        self._stamp_ns = stamp_ns
         if len(points) < self._config.min_points:
             return self._lost(f"{len(points)} points, {self._config.min_points} needed")
         kiss = self._kiss
@@ -77,12 +78,12 @@ class KissIcpOdometry:
         if quality < MIN_FIT_OF_OLD_TREE and self._tree_age:
             self._build_tree()
             quality, residual_m = self._fit(xyz_start)
-        measured = {"quality": quality, "residual_m": residual_m, "innovation_m": innovation_m}
         if self._tree is not None:
-            if quality < (self._config.relock_quality if self._is_lost else self._config.min_quality):
-                return self._lost(f"only {quality:.0%} of the scan lies on the map", measured)
+            if quality < (self._config.min_quality_after_loss if self._is_lost else self._config.min_quality):
+                reason = f"only {quality:.0%} of the scan lies on the map"
+                return self._lost(reason, quality, residual_m, innovation_m)
             if innovation_m > self._config.max_innovation_m:
-                return self._lost(f"jumped {innovation_m:.2f} m in one frame", measured)
+                return self._lost(f"jumped {innovation_m:.2f} m in one frame", quality, residual_m, innovation_m)
         kiss.adaptive_threshold.update_model_deviation(innovation)
         kiss.local_map.update(downsampled, pose)
         kiss.last_delta = np.linalg.inv(kiss.last_pose) @ pose
@@ -92,7 +93,7 @@ class KissIcpOdometry:
         if self._tree is None or self._tree_age >= TREE_PERIOD:
             self._build_tree()
         self._is_lost = False
-        return {"world_from_camera": pose, "trusted": True, "reason": "", **measured}
+        return PoseEstimate(pose, "", quality, residual_m, innovation_m)
 
     def _build_tree(self) -> None:
         self._tree, self._tree_age = KDTree(self._kiss.local_map.point_cloud()), 0
@@ -107,17 +108,16 @@ class KissIcpOdometry:
         distances = distances[np.isfinite(distances)]
         return len(distances) / len(xyz), float(np.median(distances)) if len(distances) else float("nan")
 
-    def _lost(self, reason: str, measured: dict[str, float] | None = None) -> dict[str, Any]:
+    def _lost(self, reason: str, *measured: float) -> PoseEstimate:
         """Stay at the last trusted pose and try again from there with the next frame."""
         self._kiss.last_delta = np.eye(4)
         self._is_lost = True
-        measured = measured or {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}
-        return {"world_from_camera": self._kiss.last_pose, "trusted": False, "reason": reason, **measured}
+        return PoseEstimate(self._kiss.last_pose, reason, *measured)
 
 
-def _kiss_config(config: KissIcpConfig, threads: int) -> KISSConfig:
+def _kiss_config(config: KissIcpConfig, points_config: DepthPointsConfig, threads: int) -> KISSConfig:
     kiss = KISSConfig()
-    kiss.data.max_range, kiss.data.min_range = config.max_range_m, config.min_range_m
+    kiss.data.max_range, kiss.data.min_range = points_config.max_range_m, points_config.min_range_m
     kiss.data.deskew = False  # a depth image has one time; KISS-ICP aborts the process when it deskews equal times
     kiss.mapping.voxel_size = config.voxel_m
     kiss.mapping.max_points_per_voxel = config.max_points_per_voxel

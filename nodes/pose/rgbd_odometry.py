@@ -9,19 +9,20 @@ until one of the remembered views is recognised.
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
 
+import cv2
 import numpy as np
 from pydantic import BaseModel, Field
 
-from placegraph.nodes.pose.feature_tracker import FeatureTracker, FeatureTrackerConfig, RgbdView
+from placegraph.nodes.pose.feature_tracker import FeatureTracker, FeatureTrackerConfig, RgbdView, TrackedView
 from placegraph.nodes.pose.motion_model import extrapolate_motion
-from placegraph.runtime.arrays import F64
-from placegraph.runtime.vision.features import FeatureConfig, ViewFeatures, extract_features, match_views
+from placegraph.nodes.pose.odometry import PoseEstimate
+from placegraph.runtime.arrays import F32, F64
+from placegraph.runtime.messages import Frame
+from placegraph.runtime.vision.features import FeatureConfig, ViewFeatures, match_views
 from placegraph.runtime.vision.geometry import inverse, nearest_rigid
 
 MIN_DEPTH_CELLS = 300  # cells of coarse depth; with fewer the camera is covered and the surface says nothing
-NOT_TRACKED = {"quality": 0.0, "residual_m": float("nan"), "innovation_m": 0.0}
 
 
 class RgbdOdometryConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
@@ -54,57 +55,63 @@ class RgbdOdometry:
         self._remembered: deque[tuple[ViewFeatures, F64]] = deque(maxlen=config.max_remembered_views)
         self._next_candidate = 0  # where the search through all remembered views goes on
 
-    def register(self, view: RgbdView, stamp_ns: int) -> dict[str, Any]:
-        """Fields of the Pose for one view."""
-        span_ns, last_ns = stamp_ns - (self._stamp_ns or stamp_ns), self._stamp_ns
-        self._stamp_ns = stamp_ns
+    def estimate(self, frame: Frame, depth_m: F32) -> PoseEstimate:
+        """The pose of the next frame."""
+        gray = np.asarray(cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY), np.uint8)
+        return self.register(RgbdView(gray, depth_m, frame.intrinsics, self._config.features), frame.stamp_ns)
+
+    def register(self, view: RgbdView, stamp_ns: int) -> PoseEstimate:
+        """The pose of the next view."""
+        last_ns, self._stamp_ns = self._stamp_ns, stamp_ns
         if not self._has_started:
             return self._start(view)
+        assert last_ns is not None
         if self._is_lost or self._has_coasted_too_long(stamp_ns):
             return self._relocalise(view)
+        span_ns = stamp_ns - last_ns
         guess = nearest_rigid(self._pose @ extrapolate_motion(self._delta, span_ns, self._delta_span_ns))
         tracked = self._tracker.track(view, guess)
-        pose, c = tracked.start_from_camera, self._config
-        measured = {
-            "quality": tracked.inlier_share,
-            "residual_m": float("nan"),
-            "innovation_m": float(np.linalg.norm((inverse(guess) @ pose)[:3, 3])),
-        }
-        if tracked.inliers < c.min_inliers or tracked.inlier_share < c.min_inlier_share:
+        if tracked.inliers >= self._config.min_inliers and tracked.inlier_share >= self._config.min_inlier_share:
+            reason = ""
+            self._follow(view, tracked, span_ns)
+        else:
+            reason = f"{tracked.inliers} of the tracked corners agree ({tracked.inlier_share:.0%})"
             is_covered = np.count_nonzero(view.coarse_m) < MIN_DEPTH_CELLS
-            if tracked.overlap < c.min_overlap and not is_covered:
+            if tracked.overlap < self._config.min_overlap and not is_covered:
                 return self._relocalise(view)
             self._coasting_since_ns = last_ns if self._coasting_since_ns is None else self._coasting_since_ns
-            self._move_to(pose, span_ns)
+            self._move_to(tracked.start_from_camera, span_ns)
             if not is_covered:
-                self._tracker.add_view(view, pose, tracked)
-            reason = f"{tracked.inliers} of the tracked corners agree ({tracked.inlier_share:.0%})"
-            return self._untrusted(reason, measured)
-        if self._coasting_since_ns is not None:  # has coasted, perhaps astray: a remembered view corrects that
-            self._coasting_since_ns = None
-            recognised = self._recognise(view, list(self._remembered)[: -c.max_candidates - 1 : -1])
-            if recognised is not None:
-                self._delta, self._pose, self._delta_span_ns = inverse(self._pose) @ pose, recognised, span_ns
-                self._tracker.add_view(view, recognised)
-                return _trusted(recognised, measured)
-        self._move_to(pose, span_ns)
-        if self._tracker.add_view(view, pose, tracked):
-            self._remember(view)
-        return _trusted(pose, measured)
+                self._tracker.add_view(view, self._pose, tracked)
+        innovation_m = float(np.linalg.norm((inverse(guess) @ tracked.start_from_camera)[:3, 3]))
+        return PoseEstimate(self._pose, reason, quality=tracked.inlier_share, innovation_m=innovation_m)
 
-    def _start(self, view: RgbdView) -> dict[str, Any]:
+    def _start(self, view: RgbdView) -> PoseEstimate:
         self._tracker.add_view(view, self._pose)
         if len(self._tracker) < self._config.min_inliers:
-            return self._untrusted(f"{len(self._tracker)} corners with depth to begin with", NOT_TRACKED)
+            return PoseEstimate(self._pose, f"{len(self._tracker)} corners with depth to begin with")
         self._has_started = True
         self._remember(view)
-        return _trusted(self._pose, NOT_TRACKED | {"quality": 1.0})
+        return PoseEstimate(self._pose, quality=1.0)
+
+    def _follow(self, view: RgbdView, tracked: TrackedView, span_ns: int) -> None:
+        """Move to a trusted pose; after coasting, perhaps astray, to that of a view that is recognised."""
+        recognised = None
+        if self._coasting_since_ns is not None:
+            self._coasting_since_ns = None
+            recognised = self._recognise(view, list(self._remembered)[: -self._config.max_candidates - 1 : -1])
+        self._move_to(tracked.start_from_camera, span_ns)
+        if recognised is not None:
+            self._pose = recognised
+            self._tracker.add_view(view, recognised)
+        elif self._tracker.add_view(view, self._pose, tracked):
+            self._remember(view)
 
     def _has_coasted_too_long(self, stamp_ns: int) -> bool:
         since_ns = self._coasting_since_ns
         return since_ns is not None and (stamp_ns - since_ns) * 1e-9 > self._config.max_coasting_s
 
-    def _relocalise(self, view: RgbdView) -> dict[str, Any]:
+    def _relocalise(self, view: RgbdView) -> PoseEstimate:
         """Look for a lost camera among the remembered views: half of them the newest, half all others in turn."""
         views, c, self._is_lost = list(self._remembered), self._config, True
         newest = views[: -(c.max_candidates // 2) - 1 : -1]
@@ -112,33 +119,22 @@ class RgbdOdometry:
         self._next_candidate += len(others)
         pose = self._recognise(view, [*newest, *others])
         if pose is None:
-            return self._untrusted("lost: no place seen before is recognised", NOT_TRACKED)
+            return PoseEstimate(self._pose, "lost: no place seen before is recognised")
         jump_m = float(np.linalg.norm(pose[:3, 3] - self._pose[:3, 3]))
         self._pose, self._delta, self._delta_span_ns = pose, np.eye(4), 0
         self._coasting_since_ns, self._is_lost = None, False
         self._tracker.add_view(view, pose)
-        return _trusted(pose, NOT_TRACKED | {"quality": 1.0, "innovation_m": jump_m})
+        return PoseEstimate(pose, quality=1.0, innovation_m=jump_m)
 
     def _recognise(self, view: RgbdView, candidates: list[tuple[ViewFeatures, F64]]) -> F64 | None:
-        if not candidates:
-            return None
-        features = extract_features(view.gray, view.depth_m, view.intrinsics, self._config.features)
         for remembered, pose in candidates:
-            match = match_views(remembered, features, self._config.features)
+            match = match_views(remembered, view.features, self._config.features)
             if match is not None:
                 return nearest_rigid(pose @ match.reference_from_camera)
         return None
 
     def _remember(self, view: RgbdView) -> None:
-        features = extract_features(view.gray, view.depth_m, view.intrinsics, self._config.features)
-        self._remembered.append((features, self._pose))
+        self._remembered.append((view.features, self._pose))
 
     def _move_to(self, pose: F64, span_ns: int) -> None:
         self._delta, self._pose, self._delta_span_ns = inverse(self._pose) @ pose, pose, span_ns
-
-    def _untrusted(self, reason: str, measured: dict[str, float]) -> dict[str, Any]:
-        return {"world_from_camera": self._pose, "trusted": False, "reason": reason, **measured}
-
-
-def _trusted(pose: F64, measured: dict[str, float]) -> dict[str, Any]:
-    return {"world_from_camera": pose, "trusted": True, "reason": "", **measured}

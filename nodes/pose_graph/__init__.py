@@ -18,7 +18,7 @@ from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.messages import Correction, Keyframe, Message
 from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.vision.geometry import inverse, nearest_rigid, rotation_angle_rad
-from placegraph.runtime.vision.registration import logarithm
+from placegraph.runtime.vision.registration import is_within
 
 MOVED_PER_WAIT = 40  # after moving so many keyframes, loops wait for one more keyframe: steps of a long run stay short
 
@@ -125,8 +125,8 @@ class PoseGraphNode(Node):
 
     def _contradicts_poses(self, loop: Loop) -> bool:
         expected = inverse(self._poses[loop.first]) @ self._poses[loop.second]
-        error, c = logarithm(inverse(expected) @ loop.first_from_second), self.config
-        return bool(np.linalg.norm(error[:3]) > c.min_loop_error_m or np.linalg.norm(error[3:]) > c.min_loop_error_rad)
+        error, c = inverse(expected) @ loop.first_from_second, self.config
+        return not is_within(error, c.min_loop_error_m, c.min_loop_error_rad)
 
     def _moved(self) -> I64:
         """Numbers of earlier keyframes that are no longer where the map has them."""

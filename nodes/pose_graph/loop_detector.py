@@ -17,7 +17,7 @@ from placegraph.runtime.arrays import F32, F64, U8
 from placegraph.runtime.messages import Keyframe
 from placegraph.runtime.vision.features import FeatureConfig, ViewFeatures, extract_features, match_views
 from placegraph.runtime.vision.geometry import inverse
-from placegraph.runtime.vision.registration import logarithm
+from placegraph.runtime.vision.registration import is_within
 
 LAYOUT_SIZE = (8, 6)  # cells of the colour layout, columns and rows
 
@@ -65,19 +65,17 @@ class LoopDetector:
 
     def add(self, keyframe: Keyframe, world_from_camera: F64) -> ViewFeatures | None:
         """Remember a keyframe at its pose (4, 4); None when it stands where the last remembered one did."""
-        if self._last_pose is not None:
-            motion = logarithm(inverse(self._last_pose) @ world_from_camera)
-            if (
-                np.linalg.norm(motion[:3]) < self.config.min_motion_m
-                and np.linalg.norm(motion[3:]) < self.config.min_turn_rad
-            ):
-                self.features.append(None)
-                self.layouts.append(np.zeros_like(self.layouts[-1]))
-                return None
+        c = self.config
+        if self._last_pose is not None and is_within(
+            inverse(self._last_pose) @ world_from_camera, c.min_motion_m, c.min_turn_rad
+        ):
+            self.features.append(None)
+            self.layouts.append(np.zeros_like(self.layouts[-1]))
+            return None
         self._last_pose = world_from_camera
         depth_m = keyframe.depth_m
         gray = np.asarray(cv2.cvtColor(keyframe.color, cv2.COLOR_RGB2GRAY), np.uint8)
-        features = extract_features(gray, depth_m, keyframe.intrinsics, self.config.features)
+        features = extract_features(gray, depth_m, keyframe.intrinsics, c.features)
         self.features.append(features)
         self.layouts.append(_color_layout(keyframe.color))
         return features
@@ -87,25 +85,18 @@ class LoopDetector:
 
         poses: (K, 4, 4) world_from_camera of all keyframes; travelled_m: (K,) path length at each.
         """
-        new, view, loops = len(poses) - 1, self.features[-1], []
+        c, new, view, loops = self.config, len(poses) - 1, self.features[-1], []
         near = self._candidates_by_pose(poses, travelled_m)
         for old in [*near, *self._candidates_by_layout(near)]:
             reference = self.features[old]
-            match = match_views(reference, view, self.config.features) if reference and view else None
+            match = match_views(reference, view, c.features) if reference and view else None
             if match is None:
                 continue
-            expected = inverse(poses[old]) @ poses[new]
-            if self._is_plausible(expected, match.reference_from_camera, travelled_m[new] - travelled_m[old]):
+            deviation = inverse(poses[new]) @ poses[old] @ match.reference_from_camera
+            drift = c.deviation_share * (travelled_m[new] - travelled_m[old])
+            if is_within(deviation, c.max_deviation_m + drift, c.max_deviation_rad + drift):
                 loops.append(Loop(old, new, match.reference_from_camera))
         return loops
-
-    def _is_plausible(self, expected: F64, measured: F64, travelled_m: float) -> bool:
-        c, deviation = self.config, logarithm(inverse(expected) @ measured)
-        drift = c.deviation_share * travelled_m
-        return bool(
-            np.linalg.norm(deviation[:3]) < c.max_deviation_m + drift
-            and np.linalg.norm(deviation[3:]) < c.max_deviation_rad + drift
-        )
 
     def _candidates_by_pose(self, poses: F64, travelled_m: F64) -> list[int]:
         c, new = self.config, len(poses) - 1

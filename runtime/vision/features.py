@@ -21,8 +21,8 @@ from placegraph.runtime.vision.registration import (
     RegistrationResult,
     SurfaceMatch,
     inverse_depth_at,
-    rays,
     register,
+    unproject,
 )
 
 
@@ -75,7 +75,7 @@ def extract_features(gray: U8, depth_m: F32, intrinsics: F64, config: FeatureCon
     uv = np.array([keypoint.pt for keypoint in keypoints], np.float32).reshape(-1, 2)
     inverse_depth = inverse_depth_at(depth_m, uv)
     z = np.where(inverse_depth > 0, 1 / np.where(inverse_depth > 0, inverse_depth, 1.0), np.nan)
-    xyz = (rays(uv, intrinsics) * z[:, None]).astype(np.float32)
+    xyz = unproject(uv, z, intrinsics).astype(np.float32)
     return ViewFeatures(uv, xyz, np.asarray(descriptors, np.uint8), coarse_mm, intrinsics)
 
 

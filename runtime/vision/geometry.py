@@ -97,11 +97,15 @@ def bounding_box(xyz: Points) -> F32:
     return np.stack((xyz.min(axis=0), xyz.max(axis=0))).astype(np.float32)
 
 
-def box_iou(a: Points, b: Points) -> float:
-    """Intersection over union of two (2, 3) boxes; 0 when both are empty."""
-    overlap = np.prod(np.clip(np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]), 0, None))
-    union = np.prod(a[1] - a[0]) + np.prod(b[1] - b[0]) - overlap
-    return float(overlap / union) if union > 0 else 0.0
+def box_iou(a: Points, b: Points) -> Points:
+    """Intersection over union of axis-aligned boxes (..., 2, D), min and max, broadcast; 0 where both are empty."""
+    shared = _volume(np.minimum(a[..., 1, :], b[..., 1, :]) - np.maximum(a[..., 0, :], b[..., 0, :]))
+    union = _volume(a[..., 1, :] - a[..., 0, :]) + _volume(b[..., 1, :] - b[..., 0, :]) - shared
+    return np.divide(shared, union, out=np.zeros(union.shape, union.dtype), where=union > 0)
+
+
+def _volume(size: Points) -> Points:
+    return np.asarray(np.prod(np.maximum(size, 0), axis=-1))
 
 
 def box_distance_m(a: Points, b: Points) -> float:

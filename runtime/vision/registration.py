@@ -145,10 +145,11 @@ def project(xyz: F64, intrinsics: F64, reference_from_camera: F64) -> F64:
     return np.stack((fx * xyz_camera[:, 0] / z + cx, fy * xyz_camera[:, 1] / z + cy), axis=1)
 
 
-def rays(uv: F32, intrinsics: F64) -> F64:
-    """Points (N, 3) one metre deep at pixels (N, 2)."""
+def unproject(uv: F32, z: F64, intrinsics: F64) -> F64:
+    """Points (N, 3) in metres, camera frame, at pixels (N, 2) and depths (N,) in metres."""
     fx, fy, cx, cy = intrinsics
-    return np.stack(((uv[:, 0] - cx) / fx, (uv[:, 1] - cy) / fy, np.ones(len(uv))), axis=1).astype(float)
+    rays = np.stack(((uv[:, 0] - cx) / fx, (uv[:, 1] - cy) / fy, np.ones(len(uv))), axis=1)
+    return rays.astype(float) * z[:, None]
 
 
 def inverse_depth_at(depth_m: F32, uv: F32) -> F64:
@@ -175,3 +176,9 @@ def exponential(step: F64) -> F64:
 def logarithm(motion: F64) -> F64:
     """Shift and turn (6,) of a motion (4, 4), the inverse of `exponential`."""
     return np.concatenate((motion[:3, 3], cv2.Rodrigues(motion[:3, :3])[0].ravel()))
+
+
+def is_within(motion: F64, max_m: float, max_rad: float) -> bool:
+    """Whether a motion (4, 4) shifts and turns by no more than the limits."""
+    shift_and_turn = logarithm(motion)
+    return bool(np.linalg.norm(shift_and_turn[:3]) <= max_m and np.linalg.norm(shift_and_turn[3:]) <= max_rad)

@@ -1,8 +1,9 @@
 import pytest
 
 from placegraph.models_onnx import Detector, InstanceSegmenter, Segmenter, Tagger
-from placegraph.models_onnx.load import load, wrong_task
+from placegraph.models_onnx.load import load, load_for_node
 from placegraph.runtime.errors import ConfigError, ModelError
+from placegraph.runtime.node import Context
 
 
 def test_each_family_implements_its_tasks(tiny, tmp_path):
@@ -32,5 +33,7 @@ def test_an_unknown_family_or_name_is_an_error(tiny, tmp_path):
 
 def test_a_network_for_another_task_is_named(tiny, tmp_path):
     tiny.write_models(tmp_path)
-    error = wrong_task("tagger", "tiny_sam", load("tiny_sam", [tmp_path]), "tag images")
-    assert str(error) == "[nodes.tagger] model: 'tiny_sam' is of family 'sam', which cannot tag images"
+    context = Context(model_dirs=(str(tmp_path),))
+    with pytest.raises(ConfigError, match=r"^\[nodes.tagger\] model: 'tiny_sam' is of family 'sam', which cannot tag"):
+        load_for_node(Tagger, "tiny_sam", "tagger", context)
+    assert isinstance(load_for_node(Segmenter, "tiny_sam", "segmenter", context), Segmenter)

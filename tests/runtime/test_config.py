@@ -54,7 +54,7 @@ def test_absent_file_lists_those_that_come_with_placegraph(tmp_path: Path) -> No
         (CAMERA + "[nodes.pose.rgbd]\nmin_inlier = 1", r"rgbd.min_inlier: unknown key, did you mean min_inliers\?"),
         (CAMERA + "[nodes.pose.rgbd.xyz]\nq = 1", r"\[nodes.pose\] rgbd.xyz: unknown key; there are: "),
         (CAMERA + '[nodes.pose]\nstride = "4"', r"\[nodes.pose\] stride: Input should be a valid integer"),
-        (CAMERA + "[nodes.pose]\nvoxel_m = 0.0", r"\[nodes.pose\] voxel_m: Input should be greater than 0"),
+        (CAMERA + "[nodes.pose.kiss_icp]\nvoxel_m = 0.0", r"\[nodes.pose\] kiss_icp.voxel_m: Input should be greater"),
         (
             CAMERA + "[nodes.keyframe]",
             r"keyframe needs Pose, which no node produces: add \[nodes.playback\] or \[nodes.pose\]",

@@ -70,7 +70,7 @@ def grounding_scores(
     """Scores overall and by form; `boxes` are the map objects' (2, 3) by id, in the frame of the questions."""
     ious = np.array(
         [
-            box_iou(boxes[result.object_id], question.box)
+            float(box_iou(boxes[result.object_id], question.box))
             if result.status == "found" and result.object_id in boxes
             else 0.0
             for question, result in zip(questions, results, strict=True)

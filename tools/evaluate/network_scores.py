@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from placegraph.models_onnx import Boxes, Detector, ScoredNames, Segmenter, Tagger
+from placegraph.models_onnx import Detector, NamedBoxes, ScoredNames, Segmenter, Tagger
 from placegraph.models_onnx.load import load
 from placegraph.models_onnx.manifest import find_weights
 from placegraph.runtime.arrays import F64
@@ -155,7 +155,7 @@ def tag_scores(tags: ScoredNames) -> F64:
     return scores
 
 
-def detected_boxes(boxes: Boxes) -> DetectedBoxes:
+def detected_boxes(boxes: NamedBoxes) -> DetectedBoxes:
     """Boxes by class; those whose name is no word of a class are left out."""
     classes = np.array([CLASS_OF_WORD.get(normal_form(name), -1) for name in boxes.names], np.int64)
     kept = classes >= 0

@@ -133,16 +133,14 @@ def evaluate_locations(
 ) -> None:
     """Compare the paper's labelling recipe, and networks, with the true locations of evaluation houses: F1@delta."""
     from placegraph.models_onnx import LocationDetector
-    from placegraph.models_onnx.load import load, wrong_task
+    from placegraph.models_onnx.load import load, require_task
     from placegraph.nodes.hierarchy.locations import LocationConfig
     from placegraph.tools.training.location_evaluation import comparison, finder_for
     from placegraph.tools.training.view_rendering import EVALUATION_SEEDS
 
     finders = {"recipe": finder_for(LocationConfig())}
     for name in model or ["house_locations"]:
-        network = load(name, models or [])
-        if not isinstance(network, LocationDetector):
-            raise wrong_task("hierarchy", name, network, "find locations")
+        network = require_task(load(name, models or []), LocationDetector, name, "--model")
         finders[name] = finder_for(LocationConfig(model=name), network)
     print(comparison(finders, EVALUATION_SEEDS[:houses]))
 

@@ -2,6 +2,9 @@ import numpy as np
 import pytest
 
 from placegraph.nodes.pose import PoseConfig, PoseNode
+from placegraph.nodes.pose.given_poses import GivenPoses
+from placegraph.nodes.pose.kiss_icp import KissIcpOdometry
+from placegraph.nodes.pose.rgbd_odometry import RgbdOdometry
 from placegraph.runtime.messages import End, Frame, Pose
 from placegraph.runtime.node import Context
 
@@ -34,9 +37,8 @@ def frame(i: int, depth_m: np.ndarray, given: np.ndarray | None = None, up: np.n
 
 
 def node(**settings: object) -> PoseNode:
-    return PoseNode(
-        PoseConfig(**({"method": "kiss_icp", "stride": 1, "gravity_frames": 1, "voxel_m": 0.05} | settings)), Context()
-    )
+    shape = {"method": "kiss_icp", "stride": 1, "gravity_frames": 1, "kiss_icp": {"voxel_m": 0.05}}
+    return PoseNode(PoseConfig(**(shape | settings)), Context())
 
 
 def only(given: object) -> Pose:
@@ -100,6 +102,14 @@ def test_given_poses_pass_through_and_missing_ones_are_not_trusted() -> None:
     assert not missing.trusted and "no pose" in missing.reason
 
 
+@pytest.mark.parametrize(
+    ("method", "built"), [("rgbd", RgbdOdometry), ("kiss_icp", KissIcpOdometry), ("given", GivenPoses)]
+)
+def test_only_the_chosen_odometry_is_built(method: str, built: type) -> None:
+    values = vars(node(method=method)).values()
+    assert [type(value) for value in values if hasattr(value, "estimate")] == [built]
+
+
 def test_same_frames_same_poses_bit_for_bit() -> None:
     def track() -> list[bytes]:
         odometry = node()
@@ -108,7 +118,7 @@ def test_same_frames_same_poses_bit_for_bit() -> None:
     assert track() == track()
 
 
-@pytest.mark.parametrize("settings", [{"voxel_m": 0.0}, {"stride": 0}, {"method": "gps"}])
+@pytest.mark.parametrize("settings", [{"kiss_icp": {"voxel_m": 0.0}}, {"stride": 0}, {"method": "gps"}])
 def test_bad_settings(settings: dict) -> None:
     with pytest.raises(ValueError, match="Input should be"):
         PoseConfig(**settings)

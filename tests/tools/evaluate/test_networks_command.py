@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import typer
 
-from placegraph.models_onnx import Boxes, ScoredNames
+from placegraph.models_onnx import NamedBoxes, ScoredNames
 from placegraph.runtime.errors import ConfigError, ModelError
 from placegraph.tools.evaluate.evaluation_views import (
     evaluation_shards,
@@ -95,15 +95,15 @@ def test_every_class_is_prompted_once_by_a_word_of_its_own() -> None:
     assert len(set(UNTRAINED_SYNONYMS)) == len(CLASSES) == len(HAS_UNTRAINED_SYNONYM)
     names = tuple(UNTRAINED_SYNONYMS[::-1])
     boxes = np.tile(np.array([[0, 0, 9, 9]], np.float32), (len(names), 1))
-    found = detected_boxes(Boxes(names, boxes, np.ones(len(names), np.float32)))
+    found = detected_boxes(NamedBoxes(names, boxes, np.ones(len(names), np.float32)))
     assert found.classes.tolist() == list(range(len(CLASSES)))[::-1]
 
 
 def test_words_of_no_class_are_left_out() -> None:
     scores = np.array([0.9, 0.5, 0.7], np.float32)
-    found = detected_boxes(Boxes(("zebra", "couch", "mugs"), np.eye(3, 4, dtype=np.float32), scores))
+    found = detected_boxes(NamedBoxes(("zebra", "couch", "mugs"), np.eye(3, 4, dtype=np.float32), scores))
     assert found.classes.tolist() == [SOFA, CUP] and found.scores == pytest.approx([0.5, 0.7])
-    assert detected_boxes(Boxes((), np.zeros((0, 4), np.float32), np.zeros(0, np.float32))).boxes.shape == (0, 4)
+    assert detected_boxes(NamedBoxes((), np.zeros((0, 4), np.float32), np.zeros(0, np.float32))).boxes.shape == (0, 4)
     tags = tag_scores(ScoredNames(("sofa", "couch", "zebra"), np.array([0.3, 0.6, 0.9], np.float32)))
     assert tags[SOFA] == pytest.approx(0.6) and tags.sum() == pytest.approx(0.6)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from placegraph.models_onnx.segments import pack_segments
+from placegraph.models_onnx.masks import pack_segments
 from placegraph.runtime.messages import Keyframe
 
 
