@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from placegraph.nodes.fusion.clustering import main_clusters
 from placegraph.nodes.fusion.mask_lifting import Observation
 from placegraph.nodes.fusion.object_cloud import ObjectCloud, VoxelContext
 from placegraph.nodes.fusion.spatial_index import is_nearer_to_second
 from placegraph.nodes.fusion.visibility import VisibilityConfig
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool
+from placegraph.runtime.vision.clustering import main_clusters
 from placegraph.runtime.vision.geometry import bounding_box, yaw_box
 
 # All three were chosen by hand.
