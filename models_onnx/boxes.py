@@ -1,4 +1,4 @@
-"""Boxes of a detector's raw output: overlap, and the suppression of repeated finds."""
+"""Boxes of a detector's raw output: suppression of repeated finds, best classes, names."""
 
 from __future__ import annotations
 
@@ -8,19 +8,9 @@ import numpy as np
 
 from placegraph.models_onnx import Boxes
 from placegraph.runtime.arrays import F32, I64
+from placegraph.runtime.vision.geometry import box_iou
 
 MAX_CANDIDATES = 1000  # boxes that enter suppression; bounds its time on a network that fires everywhere
-
-
-def iou(one: F32, many: F32) -> F32:
-    """Intersection over union of one box (4,) with many (N, 4), px; 0 where both are empty."""
-    low = np.maximum(one[:2], many[:, :2])
-    high = np.minimum(one[2:], many[:, 2:])
-    shared = np.prod(np.maximum(high - low, 0), axis=1)
-    areas = np.prod(np.maximum(many[:, 2:] - many[:, :2], 0), axis=1)
-    union = np.prod(np.maximum(one[2:] - one[:2], 0)) + areas - shared
-    found: F32 = np.divide(shared, union, out=np.zeros(len(many), np.float32), where=union > 0).astype(np.float32)
-    return found
 
 
 def from_centres(centres: F32) -> F32:
@@ -31,12 +21,13 @@ def from_centres(centres: F32) -> F32:
 
 def suppress(boxes: F32, scores: F32, classes: I64, nms_iou: float) -> I64:
     """Greedy suppression within each class: indices of the boxes (N, 4) kept, best score first (ties: lower index)."""
+    corners = boxes.reshape(-1, 2, 2)
     order = np.argsort(-scores, kind="stable")[:MAX_CANDIDATES]
     kept: list[int] = []
     while len(order):
         best, rest = order[0], order[1:]
         kept.append(int(best))
-        repeats = (iou(boxes[best], boxes[rest]) > nms_iou) & (classes[rest] == classes[best])
+        repeats = (box_iou(corners[best], corners[rest]) > nms_iou) & (classes[rest] == classes[best])
         order = rest[~repeats]
     return np.array(kept, np.int64)
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from placegraph.models_onnx import Boxes, Instances, Masks, ScoredNames
-from placegraph.models_onnx.boxes import iou
 from placegraph.models_onnx.manifest import ModelOptions, Weights
 from placegraph.models_onnx.session import Session
 from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import ModelError
+from placegraph.runtime.vision.geometry import box_iou
 
 
 class Options(ModelOptions):
@@ -96,7 +96,7 @@ class FAMILY:
         nothing = np.zeros(image.shape[:2], bool)
         masks: Masks = []
         for box in boxes_px:
-            overlap = iou(box, pieces.boxes.boxes_px)
+            overlap = box_iou(box.reshape(2, 2), pieces.boxes.boxes_px.reshape(-1, 2, 2))
             best = int(overlap.argmax()) if len(overlap) else -1
             masks.append(pieces.masks[best] if best >= 0 and overlap[best] > 0 else nothing)
         return masks

@@ -20,6 +20,7 @@ from placegraph.models_onnx.session import Session
 from placegraph.models_onnx.yolo import input_size, prepare
 from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ModelError
+from placegraph.runtime.vision.geometry import box_iou
 
 
 class Options(ModelOptions):
@@ -87,7 +88,7 @@ class FAMILY:
         certainty = raw.scores.max(axis=1)
         masks: Masks = []
         for box in boxes_px:
-            overlap = boxes.iou(box, raw.boxes_px)
+            overlap = box_iou(box.reshape(2, 2), raw.boxes_px.reshape(-1, 2, 2))
             fit = np.where(overlap >= self._options.prompt_iou, overlap * certainty, -1)
             best = int(fit.argmax()) if len(fit) else -1
             if best < 0 or fit[best] < 0:

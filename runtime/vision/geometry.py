@@ -97,11 +97,15 @@ def bounding_box(xyz: Points) -> F32:
     return np.stack((xyz.min(axis=0), xyz.max(axis=0))).astype(np.float32)
 
 
-def box_iou(a: Points, b: Points) -> float:
-    """Intersection over union of two (2, 3) boxes; 0 when both are empty."""
-    overlap = np.prod(np.clip(np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]), 0, None))
-    union = np.prod(a[1] - a[0]) + np.prod(b[1] - b[0]) - overlap
-    return float(overlap / union) if union > 0 else 0.0
+def box_iou(a: Points, b: Points) -> Points:
+    """Intersection over union of boxes (..., 2, D), broadcast against each other: (...), 0 where both are empty.
+
+    Boxes are (min, max) in any D axes; `a[:, None]` against `b[None]` gives all pairs.
+    """
+    shared = np.prod(np.maximum(np.minimum(a[..., 1, :], b[..., 1, :]) - np.maximum(a[..., 0, :], b[..., 0, :]), 0), -1)
+    size_a, size_b = (np.prod(np.maximum(boxes[..., 1, :] - boxes[..., 0, :], 0), -1) for boxes in (a, b))
+    union = np.asarray(size_a + size_b - shared)
+    return np.asarray(np.divide(shared, union, out=np.zeros_like(union), where=union > 0))
 
 
 def box_distance_m(a: Points, b: Points) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from placegraph.runtime.arrays import F64, I64, Bool
+from placegraph.runtime.vision.geometry import box_iou
 
 MAX_BOXES = 100  # of one image count, best first; COCO's maxDets
 RECALLS = np.linspace(0, 1, 101)  # at which the precision is read; COCO
@@ -96,8 +97,4 @@ def _interpolated(scores: F64, right: Bool, count: int) -> float:
 
 def overlaps(a: F64, b: F64) -> F64:
     """(N, M) intersection over union of boxes (N, 4) and (M, 4) x0 y0 x1 y1; 0 where both are empty."""
-    low, high = np.maximum(a[:, None, :2], b[None, :, :2]), np.minimum(a[:, None, 2:], b[None, :, 2:])
-    shared = np.prod(np.maximum(high - low, 0), axis=2)
-    area_a, area_b = (np.prod(np.maximum(one[:, 2:] - one[:, :2], 0), axis=1) for one in (a, b))
-    union = area_a[:, None] + area_b[None] - shared
-    return np.asarray(np.divide(shared, union, out=np.zeros_like(shared, np.float64), where=union > 0))
+    return np.asarray(box_iou(a.reshape(-1, 1, 2, 2), b.reshape(1, -1, 2, 2)), np.float64)
