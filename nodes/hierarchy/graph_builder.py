@@ -15,7 +15,7 @@ from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floor
 from placegraph.nodes.hierarchy.locations import LocationArea, LocationConfig, find_locations
 from placegraph.nodes.hierarchy.memo import Memo, digest
 from placegraph.nodes.hierarchy.object_rooms import FloorRoom, assign_rooms
-from placegraph.nodes.hierarchy.persistent_ids import PersistentIds, PlaceFootprint, height_footprint
+from placegraph.nodes.hierarchy.persistent_ids import PersistentIds, height_outline
 from placegraph.nodes.hierarchy.place_graph_builder import FloorPlan, PlacedObject, PlaceGraph, PlaceGraphBuilder
 from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.nodes.hierarchy.rooms import RoomArea, RoomConfig, find_rooms
@@ -68,7 +68,7 @@ class GraphBuilder:
             spans = find_floors(map_.object_points_world, map_.camera_positions_world, self._config.floors)
         points = map_.points_world if len(map_.points_world) else map_.object_points_world
         floor_ids = self._floor_ids.assign(
-            [PlaceFootprint(height_footprint(span.low, max(span.ceiling, span.low + 0.1))) for span in spans]
+            [("", height_outline(span.low, max(span.ceiling, span.low + 0.1))) for span in spans]
         )
         nodes: list[Node] = []
         rooms: list[FloorRoom] = []
@@ -77,7 +77,7 @@ class GraphBuilder:
             floor_points, free = _in_zone(points, span), _in_zone(map_.free_points_world, span)
             grid, areas, extent = self._find_rooms(floor_points, free, map_.free_cell_m, span)
             extents.append(extent)
-            ids = self._room_ids.assign([PlaceFootprint(area.outline, floor_id) for area in areas])
+            ids = self._room_ids.assign([(floor_id, area.outline) for area in areas])
             nodes.append(_place_node(floor_id, "B0", span, extent.outline, (Tag(f"floor {i + 1}", 1.0),)))
             rooms += [FloorRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
         nodes += [_place_node(room.id, room.floor_id, room.span, room.area.outline) for room in rooms]
@@ -133,7 +133,7 @@ class GraphBuilder:
             (room, area) for room in rooms for area in self._find_locations(room, in_room[room.id], objects, digests)
         ]
         # all of them at once: an id goes to one place, also when a room is split
-        ids = self._location_ids.assign([PlaceFootprint(area.outline, room.floor_id) for room, area in areas])
+        ids = self._location_ids.assign([(room.floor_id, area.outline) for room, area in areas])
         parents = [room.id for room in object_rooms]
         nodes = []
         for location_id, (room, area) in zip(ids, areas, strict=True):

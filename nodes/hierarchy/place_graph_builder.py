@@ -16,7 +16,7 @@ from placegraph.nodes.hierarchy.approach_poses import ApproachCell, ApproachTarg
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan
 from placegraph.nodes.hierarchy.openings import Opening, find_openings, grow_rooms
 from placegraph.nodes.hierarchy.path_planning import ShortestPaths, path_length_m, shortest_paths
-from placegraph.nodes.hierarchy.persistent_ids import PersistentIds, PlaceFootprint
+from placegraph.nodes.hierarchy.persistent_ids import PersistentIds
 from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.nodes.hierarchy.rooms import RoomConfig
 from placegraph.nodes.hierarchy.stairs import Stairs, find_stairs, path_segments_on, standing_floors
@@ -145,8 +145,8 @@ class PlaceGraphBuilder:
         for stairs in find_stairs(map_.camera_positions_world, standing, spans, map_.points_world, self._config):
             if (draft := self._stairs(stairs, floors)) is not None:
                 drafts.append(draft)
-        footprints = [PlaceFootprint(_square(draft.ends.mean(axis=0)), draft.group) for draft in drafts]
-        for draft, connection_id in zip(drafts, self._connection_ids.assign(footprints), strict=True):
+        squares = [(draft.group, _square(draft.ends.mean(axis=0))) for draft in drafts]
+        for draft, connection_id in zip(drafts, self._connection_ids.assign(squares), strict=True):
             draft.id = connection_id
         return sorted(drafts, key=lambda draft: int(draft.id[1:]))
 

@@ -32,8 +32,8 @@ def overlaps(found: Sequence[Area], true: Sequence[Area], cell_m: float) -> Area
     """Overlaps of areas, counted in cells of a common grid whose centre lies in them."""
     a, b = ([rasterize(outline, cell_m) for _, outline in areas] for areas in (found, true))
     shared = np.zeros((len(found), len(true)))
-    for i, j in np.ndindex(*shared.shape):
-        if found[i][0] == true[j][0]:
+    for i, (floor, _) in enumerate(found):
+        for j in [j for j, (true_floor, _) in enumerate(true) if true_floor == floor]:
             shared[i, j] = _shared_cells(a[i], b[j])
     sizes = (np.array([mask.sum() for _, mask in rasters], float) for rasters in (a, b))
     return AreaOverlaps(shared, *sizes)
