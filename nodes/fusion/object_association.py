@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from placegraph.nodes.fusion.mask_lifting import Observation
 from placegraph.nodes.fusion.object_cloud import VoxelContext
-from placegraph.nodes.fusion.object_instance import ObjectInstance
+from placegraph.nodes.fusion.object_instance import KeyframeStamp, ObjectInstance
 from placegraph.nodes.fusion.spatial_index import SpatialIndex, boxes_within, containment, share_near, touches_both
 from placegraph.nodes.fusion.visibility import DepthVisibility
 from placegraph.runtime.arrays import F32, F64
@@ -41,14 +41,6 @@ class AssociationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     split_views: int = 3  # an object is split when so many more views show such a gap than do not
     merge_every: int = 10  # keyframes; BBQ: 20
     prune_after: int = 20  # keyframes without a second view; ConceptGraphs drops what has fewer than 3 views
-
-
-class KeyframeStamp(NamedTuple):
-    """When something was seen: the keyframe, counted from 0 over the run, its frame id and its submap."""
-
-    keyframe: int
-    frame_id: int
-    submap: int = 0
 
 
 class RetiredObject(NamedTuple):
@@ -84,9 +76,9 @@ class ObjectMap:
             if object_id is None:
                 object_id = self._next_id
                 self._next_id += 1
-                self.instances[object_id] = ObjectInstance(object_id, observation, *stamp, self._context)
+                self.instances[object_id] = ObjectInstance(object_id, observation, stamp, self._context)
             else:
-                self.instances[object_id].update(observation, *stamp)
+                self.instances[object_id].update(observation, stamp)
             observed.setdefault(object_id, []).append(observation)
             self._spatial_index.update(object_id, self.instances[object_id].box)
         for object_id, views in observed.items():
@@ -140,11 +132,11 @@ class ObjectMap:
         """Follow submaps that have moved, and merge objects that now coincide, retired ones included."""
         for instance in self.instances.values():
             if instance.cloud.is_from_any(moves):
-                instance.reintegrate()
+                instance.move_submaps(moves)
                 self._spatial_index.update(instance.object_id, instance.box)
         for object_id, (instance, _) in list(self.retired.items()):
             if instance.cloud.is_from_any(moves):
-                instance.reintegrate()
+                instance.move_submaps(moves)
                 self._merge_retired(object_id)
         self.merge_duplicates(keyframe)
 
