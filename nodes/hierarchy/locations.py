@@ -22,7 +22,7 @@ from pydantic import BaseModel, Field
 from placegraph.models_onnx import LocationDetector
 from placegraph.nodes.hierarchy.birds_eye_view import birds_eye_image
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.plan_grid import floor_grid
+from placegraph.nodes.hierarchy.plan_grid import close_gaps, floor_grid
 from placegraph.runtime.arrays import F64, Points
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.vision.clustering import dbscan
@@ -131,10 +131,7 @@ def _outline(objects: list[Points], config: LocationConfig) -> F64 | None:
     cell = config.cell_m / 2
     reach = max(1, round(config.close_m / cell))
     grid = floor_grid(np.concatenate((xy - config.close_m, xy + config.close_m)), cell)
-    mask = np.zeros(grid.shape, np.uint8)
-    mask[grid.cells(xy)] = 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    outline = grid.outline(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel).astype(bool))
+    outline = grid.outline(close_gaps(grid.image(xy), reach))
     area = cv2.contourArea(outline.astype(np.float32))
     length = cv2.arcLength(outline.astype(np.float32), True)
     if area < config.min_area_m2 or 4 * np.pi * area < config.compactness * length**2:
