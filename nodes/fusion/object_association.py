@@ -7,7 +7,9 @@ so that a table does not swallow the cup on it; two objects seen side by side in
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +65,7 @@ class ObjectMap:
         self._next_id = 0
         self._name_vectors: dict[str, F32] = {}
         self._spatial_index = SpatialIndex()
-        self._seen_apart: dict[tuple[int, int], int] = {}  # views that showed both as separate objects
+        self._seen_apart: Counter[frozenset[int]] = Counter()  # views that showed both as separate objects
         self._visible_ids: list[int] = []  # of the last keyframe
         self._checked_revisions: dict[int, int] = {}  # at which an object was last compared with its neighbours
 
@@ -107,7 +109,7 @@ class ObjectMap:
             self.instances[new.object_id] = new
             for part in (instance, new):
                 self._spatial_index.update(part.object_id, part.box)
-            self._seen_apart[instance.object_id, new.object_id] = c.split_views
+            self._seen_apart[frozenset((instance.object_id, new.object_id))] = c.split_views
 
     def apply_visibility(self, visibility: DepthVisibility) -> None:
         """Count what a depth image shows of the objects in view; call it before `add` of the same keyframe."""
@@ -183,10 +185,8 @@ class ObjectMap:
         self._spatial_index.remove(object_id)
         for pair in [pair for pair in self._seen_apart if object_id in pair]:
             views = self._seen_apart.pop(pair)
-            neighbor = pair[0] if pair[1] == object_id else pair[1]
-            if merged_into is not None and neighbor != merged_into:
-                key = (min(merged_into, neighbor), max(merged_into, neighbor))
-                self._seen_apart[key] = self._seen_apart.get(key, 0) + views
+            if merged_into is not None and merged_into not in pair:
+                self._seen_apart[pair - {object_id} | {merged_into}] += views
 
     def _find_match(self, observation: Observation, observed: dict[int, list[Observation]]) -> int | None:
         c = self._config
@@ -222,7 +222,7 @@ class ObjectMap:
             forward, backward = self._overlap_shares(instance.points, instance.tree, candidate)
             cosine = self._cosine(instance.votes, candidate.votes)
             larger = max(forward, backward)
-            seen_apart = self._seen_apart.get((min(object_id, candidate_id), max(object_id, candidate_id)), 0)
+            seen_apart = self._seen_apart[frozenset((object_id, candidate_id))]
             fits = min(forward, backward) >= c.merge_unlike_overlap
             if cosine >= c.same_cosine and seen_apart < 2:
                 contained = containment(instance.box, candidate.box, self._reach_m)
@@ -264,8 +264,6 @@ class ObjectMap:
 
     def _count_seen_apart(self, object_ids: list[int]) -> None:
         reach_m = max(self._reach_m, self._config.sides_m)
-        for i, a in enumerate(object_ids):
-            for b in object_ids[i + 1 :]:
-                if boxes_within(self.instances[a].box, self.instances[b].box, reach_m):
-                    key = (min(a, b), max(a, b))
-                    self._seen_apart[key] = self._seen_apart.get(key, 0) + 1
+        for a, b in combinations(object_ids, 2):
+            if boxes_within(self.instances[a].box, self.instances[b].box, reach_m):
+                self._seen_apart[frozenset((a, b))] += 1
