@@ -46,12 +46,12 @@ def rasterize(outline: Points, cell_m: float) -> AreaRaster:
     low = np.floor(outline.min(axis=0) / cell_m).astype(np.int64)
     count = np.ceil(outline.max(axis=0) / cell_m).astype(np.int64) - low
     x, y = ((np.arange(count[axis]) + low[axis] + 0.5) * cell_m for axis in (0, 1))
-    inside = np.zeros(count, bool)
-    for (ax, ay), (bx, by) in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        if ay != by:
-            crossed = (ay > y) != (by > y)
-            inside[:, crossed] ^= x[:, None] < (bx - ax) * (y[crossed] - ay) / (by - ay) + ax
-    return low, inside
+    (ax, ay), (bx, by) = outline.T, np.roll(outline, -1, axis=0).T
+    rows, edges = np.nonzero((ay > y[:, None]) != (by > y[:, None]))
+    crossings = (bx - ax)[edges] * (y[rows] - ay[edges]) / (by - ay)[edges] + ax[edges]
+    counts = np.zeros((len(x) + 1, len(y)), np.int64)  # crossings by the number of cells of their row before them
+    np.add.at(counts, (np.searchsorted(x, crossings), rows), 1)
+    return low, np.cumsum(counts[:0:-1], axis=0)[::-1] % 2 == 1
 
 
 def _shared_cells(a: AreaRaster, b: AreaRaster) -> int:
