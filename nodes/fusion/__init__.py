@@ -11,9 +11,9 @@ from pydantic import Field
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.fusion.map_message import map_objects
 from placegraph.nodes.fusion.mask_lifting import LiftConfig, lift_masks
-from placegraph.nodes.fusion.object_association import AssociationConfig, KeyframeStamp, ObjectMap
+from placegraph.nodes.fusion.object_association import AssociationConfig, ObjectMap
 from placegraph.nodes.fusion.object_cloud import VoxelContext
-from placegraph.nodes.fusion.object_instance import ObjectInstance
+from placegraph.nodes.fusion.object_instance import KeyframeStamp, ObjectInstance
 from placegraph.nodes.fusion.submaps import SubmapConfig, Submaps
 from placegraph.nodes.fusion.visibility import DepthVisibility, VisibilityConfig
 from placegraph.nodes.fusion.voxel_map import FreeSpace, VoxelMap, depth_edges
@@ -72,7 +72,7 @@ class FusionNode(Node):
         self._submaps = Submaps(config.submap)
         self._voxels = VoxelMap(config.voxel_m, takes_corrections)
         self._free = FreeSpace(config.free_cell_m, config.free_height_m, config.free_clearance_m, takes_corrections)
-        voxel_context = VoxelContext(config.lift.voxel_m, self._submaps.world_from_fused if takes_corrections else None)
+        voxel_context = VoxelContext(config.lift.voxel_m, takes_corrections)
         self._objects = ObjectMap(TextEncoder().encode, voxel_context, config.association)
         self._pending_corrections: list[Correction] = []  # not yet applied, in order
         self._latest: Message | None = None  # the keyframe whose frame id and stamp the next Map carries

@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 from pydantic import BaseModel
 
-from placegraph.nodes.fusion.clustering import main_clusters
 from placegraph.nodes.fusion.voxel_index import sum_by_key, voxel_keys
 from placegraph.runtime.arrays import F32, F64, I32, I64, Bool
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Keyframe, Segments
+from placegraph.runtime.vision.clustering import main_clusters
 from placegraph.runtime.vision.geometry import bounding_box, transform
 
 

@@ -7,7 +7,9 @@ so that a table does not swallow the cup on it; two objects seen side by side in
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from placegraph.nodes.fusion.mask_lifting import Observation
 from placegraph.nodes.fusion.object_cloud import VoxelContext
-from placegraph.nodes.fusion.object_instance import ObjectInstance
+from placegraph.nodes.fusion.object_instance import KeyframeStamp, ObjectInstance
 from placegraph.nodes.fusion.spatial_index import SpatialIndex, boxes_within, containment, share_near, touches_both
 from placegraph.nodes.fusion.visibility import DepthVisibility
 from placegraph.runtime.arrays import F32, F64
@@ -43,14 +45,6 @@ class AssociationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     prune_after: int = 20  # keyframes without a second view; ConceptGraphs drops what has fewer than 3 views
 
 
-class KeyframeStamp(NamedTuple):
-    """When something was seen: the keyframe, counted from 0 over the run, its frame id and its submap."""
-
-    keyframe: int
-    frame_id: int
-    submap: int = 0
-
-
 class RetiredInstance(NamedTuple):
     """An object that is no longer where it was, and the frame that made it certain."""
 
@@ -71,7 +65,7 @@ class ObjectMap:
         self._next_id = 0
         self._name_vectors: dict[str, F32] = {}
         self._spatial_index = SpatialIndex()
-        self._seen_apart: dict[tuple[int, int], int] = {}  # views that showed both as separate objects
+        self._seen_apart: Counter[frozenset[int]] = Counter()  # views that showed both as separate objects
         self._visible_ids: list[int] = []  # of the last keyframe
         self._checked_revisions: dict[int, int] = {}  # at which an object was last compared with its neighbours
 
@@ -84,9 +78,9 @@ class ObjectMap:
             if object_id is None:
                 object_id = self._next_id
                 self._next_id += 1
-                self.instances[object_id] = ObjectInstance(object_id, observation, *stamp, self._context)
+                self.instances[object_id] = ObjectInstance(object_id, observation, stamp, self._context)
             else:
-                self.instances[object_id].update(observation, *stamp)
+                self.instances[object_id].update(observation, stamp)
             observed.setdefault(object_id, []).append(observation)
             self._spatial_index.update(object_id, self.instances[object_id].box)
         for object_id, views in observed.items():
@@ -115,7 +109,7 @@ class ObjectMap:
             self.instances[new.object_id] = new
             for part in (instance, new):
                 self._spatial_index.update(part.object_id, part.box)
-            self._seen_apart[instance.object_id, new.object_id] = c.split_views
+            self._seen_apart[frozenset((instance.object_id, new.object_id))] = c.split_views
 
     def apply_visibility(self, visibility: DepthVisibility) -> None:
         """Count what a depth image shows of the objects in view; call it before `add` of the same keyframe."""
@@ -140,11 +134,11 @@ class ObjectMap:
         """Follow submaps that have moved, and merge objects that now coincide, retired ones included."""
         for instance in self.instances.values():
             if instance.cloud.is_from_any(moves):
-                instance.reintegrate()
+                instance.move_submaps(moves)
                 self._spatial_index.update(instance.object_id, instance.box)
         for object_id, (instance, _) in list(self.retired.items()):
             if instance.cloud.is_from_any(moves):
-                instance.reintegrate()
+                instance.move_submaps(moves)
                 self._merge_retired(object_id)
         self.merge_duplicates(keyframe)
 
@@ -191,10 +185,8 @@ class ObjectMap:
         self._spatial_index.remove(object_id)
         for pair in [pair for pair in self._seen_apart if object_id in pair]:
             views = self._seen_apart.pop(pair)
-            neighbor = pair[0] if pair[1] == object_id else pair[1]
-            if merged_into is not None and neighbor != merged_into:
-                key = (min(merged_into, neighbor), max(merged_into, neighbor))
-                self._seen_apart[key] = self._seen_apart.get(key, 0) + views
+            if merged_into is not None and merged_into not in pair:
+                self._seen_apart[pair - {object_id} | {merged_into}] += views
 
     def _find_match(self, observation: Observation, observed: dict[int, list[Observation]]) -> int | None:
         c = self._config
@@ -230,7 +222,7 @@ class ObjectMap:
             forward, backward = self._overlap_shares(instance.points, instance.tree, candidate)
             cosine = self._cosine(instance.votes, candidate.votes)
             larger = max(forward, backward)
-            seen_apart = self._seen_apart.get((min(object_id, candidate_id), max(object_id, candidate_id)), 0)
+            seen_apart = self._seen_apart[frozenset((object_id, candidate_id))]
             fits = min(forward, backward) >= c.merge_unlike_overlap
             if cosine >= c.same_cosine and seen_apart < 2:
                 contained = containment(instance.box, candidate.box, self._reach_m)
@@ -272,8 +264,6 @@ class ObjectMap:
 
     def _count_seen_apart(self, object_ids: list[int]) -> None:
         reach_m = max(self._reach_m, self._config.sides_m)
-        for i, a in enumerate(object_ids):
-            for b in object_ids[i + 1 :]:
-                if boxes_within(self.instances[a].box, self.instances[b].box, reach_m):
-                    key = (min(a, b), max(a, b))
-                    self._seen_apart[key] = self._seen_apart.get(key, 0) + 1
+        for a, b in combinations(object_ids, 2):
+            if boxes_within(self.instances[a].box, self.instances[b].box, reach_m):
+                self._seen_apart[frozenset((a, b))] += 1

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from copy import copy
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from placegraph.nodes.fusion.submap_voxels import SubmapVoxels
 from placegraph.nodes.fusion.voxel_index import sum_by_key, voxel_keys
 from placegraph.runtime.arrays import F64, I64, U8, Bool
 from placegraph.runtime.vision.geometry import inverse, transform
@@ -15,12 +15,12 @@ from placegraph.runtime.vision.geometry import inverse, transform
 MAX_SUBMAPS_PER_OBJECT = 8  # chosen by hand; beyond it the two oldest submaps of an object are merged
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class VoxelContext:
-    """What the clouds of all objects share: the voxel size and, where the map may move, how submaps have moved."""
+    """What the clouds of all objects share: the voxel size, and whether submaps are kept because they may move."""
 
     voxel_m: float
-    world_from_fused: Mapping[int, F64] | None = None  # of the submaps that have moved; None: submaps are not kept
+    keep_submaps: bool = False
 
 
 class ObjectCloud:
@@ -31,8 +31,7 @@ class ObjectCloud:
         self.seen_through: U8 = np.zeros(len(keys), np.uint8)  # keyframes that saw through it, less those that saw it
         self.visible_counts: F64 = np.zeros(len(keys))  # views of the object that saw the voxel, in its mask or not
         self._context = context
-        self._integrated_poses: dict[int, F64] = {}  # of the submaps at the last `reintegrate`
-        self._by_submap: dict[int, tuple[I64, F64]] = {}  # as they were when they were fused
+        self._by_submap: dict[int, SubmapVoxels[np.float64]] = {}
         self._store(submap, keys, values)
 
     def add(self, keys: I64, values: F64, submap: int) -> None:
@@ -44,20 +43,12 @@ class ObjectCloud:
         """Add all voxels of another cloud."""
         self._add_values(merged.keys, merged.values)
         self.visible_counts[np.searchsorted(self.keys, merged.keys)] += merged.visible_counts
-        self._integrated_poses.update(merged._integrated_poses)
-        for submap, (keys, values) in merged._by_submap.items():
-            self._store(submap, keys, values)
+        for submap, voxels in merged._by_submap.items():
+            self._store(submap, *voxels.fused(), voxels.world_from_fused)
 
-    def copy(self) -> ObjectCloud:
-        """A cloud of the same voxels that changes on its own; only counts are ever changed in place."""
-        duplicate = copy(self)
-        duplicate._by_submap, duplicate._integrated_poses = dict(self._by_submap), dict(self._integrated_poses)
-        duplicate.visible_counts, duplicate.seen_through = self.visible_counts.copy(), self.seen_through.copy()
-        return duplicate
-
-    def is_from_any(self, submaps: Mapping[int, object]) -> bool:
+    def is_from_any(self, submaps: Iterable[int]) -> bool:
         """Whether some of its voxels came with one of these submaps."""
-        return any(submap in submaps for submap in self._by_submap)
+        return any(submap in self._by_submap for submap in submaps)
 
     def count_visible(self, keys: I64) -> None:
         """Count a view of the object that saw these voxels."""
@@ -70,20 +61,18 @@ class ObjectCloud:
         views = self.values[:, 7]
         return np.asarray(views / np.maximum(views, self.visible_counts))
 
-    def reintegrate(self) -> None:
-        """Make the voxels anew from those of the submaps, after submaps have moved."""
+    def move_submaps(self, moves: Mapping[int, F64]) -> None:
+        """Make the voxels anew after submaps have moved; moves: their new world_from_fused (4, 4)."""
         keys_before, mask_shares = self.keys, self.mask_shares()
-        moved = []
+        placed = []
         for submap in sorted(self._by_submap):
-            before = np.minimum(
-                np.searchsorted(keys_before, self._keys_at(submap, self._integrated_poses.get(submap))),
-                len(keys_before) - 1,
-            )
-            keys, values = self._by_submap[submap]
-            visible_counts = values[:, 7] / mask_shares[before]
-            moved.append(self._transformed(keys, np.column_stack((values, visible_counts)), self._pose_of(submap)))
-            self._integrated_poses[submap] = self._pose_of(submap)
-        self.keys, values = sum_by_key(*(np.concatenate(column) for column in zip(*moved, strict=True)))
+            voxels = self._by_submap[submap]
+            before = np.searchsorted(keys_before, voxels.placed(self._resample)[0])
+            voxels.world_from_fused = moves.get(submap, voxels.world_from_fused)
+            keys, values = voxels.placed(self._resample)
+            visible_counts = values[:, 7] / mask_shares[np.minimum(before, len(keys_before) - 1)]
+            placed.append(_sum_voxels(keys, np.column_stack((values, visible_counts))))
+        self.keys, values = sum_by_key(*(np.concatenate(column) for column in zip(*placed, strict=True)))
         self.values, self.visible_counts = values[:, :8], values[:, 8]
         self.seen_through = np.zeros(len(self.keys), np.uint8)
 
@@ -92,10 +81,8 @@ class ObjectCloud:
         keys = self.keys[removed]
         for name in ("keys", "values", "seen_through", "visible_counts"):
             setattr(self, name, getattr(self, name)[~removed])
-        for submap, (fused_keys, values) in list(self._by_submap.items()):
-            kept = ~np.isin(self._keys_at(submap, self._pose_of(submap)), keys)
-            self._by_submap[submap] = fused_keys[kept], values[kept]
-            if not kept.any():
+        for submap, voxels in list(self._by_submap.items()):
+            if not voxels.discard(keys, self._resample):
                 del self._by_submap[submap]
 
     def _add_values(self, keys: I64, values: F64) -> None:
@@ -106,45 +93,34 @@ class ObjectCloud:
         self.seen_through[at], self.visible_counts[at] = seen_through, visible_counts
         self.seen_through[np.searchsorted(self.keys, keys)] = 0
 
-    def _store(self, submap: int, keys: I64, values: F64) -> None:
-        if self._context.world_from_fused is None:
+    def _store(self, submap: int, keys: I64, values: F64, world_from_fused: F64 | None = None) -> None:
+        if not self._context.keep_submaps:
             return
-        if submap in self._by_submap:
-            stored_keys, stored_values = self._by_submap[submap]
-            keys, values = sum_by_key(np.r_[stored_keys, keys], np.r_[stored_values, values])
-        self._by_submap[submap] = keys, values
+        voxels = self._by_submap.setdefault(submap, SubmapVoxels(world_from_fused))
+        voxels.add(keys, values)
+        voxels.fused()
         if len(self._by_submap) > MAX_SUBMAPS_PER_OBJECT:
             self._merge_oldest_submaps()
 
     def _merge_oldest_submaps(self) -> None:
         """Merge the oldest submap into the next, with which it moves from now on."""
         oldest, second = sorted(self._by_submap)[:2]
-        keys, values = self._in_world(oldest)
-        del self._by_submap[oldest]
-        keys, values = self._transformed(keys, values, inverse(self._pose_of(second)))
-        self._store(second, keys, values)
+        to_second: SubmapVoxels[np.float64] = SubmapVoxels(inverse(self._by_submap[second].world_from_fused))
+        to_second.add(*_sum_voxels(*self._by_submap.pop(oldest).placed(self._resample)))
+        self._store(second, *_sum_voxels(*to_second.placed(self._resample)))
 
-    def _pose_of(self, submap: int) -> F64:
-        assert self._context.world_from_fused is not None
-        return self._context.world_from_fused.get(submap, np.eye(4))
-
-    def _in_world(self, submap: int) -> tuple[I64, F64]:
-        return self._transformed(*self._by_submap[submap], self._pose_of(submap))
-
-    def _keys_at(self, submap: int, pose: F64 | None) -> I64:
-        keys, values = self._by_submap[submap]
-        if pose is None or np.array_equal(pose, np.eye(4)):
-            return keys
-        return voxel_keys(transform(pose, values[:, :3] / values[:, 6:7]), self._context.voxel_m)
-
-    def _transformed(self, keys: I64, values: F64, pose: F64) -> tuple[I64, F64]:
-        if np.array_equal(pose, np.eye(4)):
-            return keys, values
+    def _resample(self, keys: I64, values: F64, world_from_fused: F64) -> tuple[I64, F64]:
+        """All pixels of a voxel move as their centroid does."""
         counts = values[:, 6:7]
-        points = transform(pose, values[:, :3] / counts)
-        moved_keys = voxel_keys(points, self._context.voxel_m)
-        order = np.argsort(moved_keys, kind="stable")
-        unique_keys, sums = sum_by_key(moved_keys, np.concatenate((points * counts, values[:, 3:]), axis=1))
-        starts = np.searchsorted(moved_keys[order], unique_keys)
-        sums[:, 7] = np.maximum.reduceat(values[order, 7], starts)  # one view may have shown both voxels
-        return unique_keys, sums
+        points = transform(world_from_fused, values[:, :3] / counts)
+        moved_values = np.concatenate((points * counts, values[:, 3:]), axis=1)
+        return voxel_keys(points, self._context.voxel_m), moved_values
+
+
+def _sum_voxels(keys: I64, values: F64) -> tuple[I64, F64]:
+    """Sorted unique voxels and sums of the values of one submap; views are not summed, as one may have shown both."""
+    order = np.argsort(keys, kind="stable")
+    unique_keys, sums = sum_by_key(keys, values)
+    starts = np.searchsorted(keys[order], unique_keys)
+    sums[:, 7] = np.maximum.reduceat(values[order, 7], starts)
+    return unique_keys, sums

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-from copy import copy
+from collections.abc import Mapping
+from copy import copy, deepcopy
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from placegraph.nodes.fusion.clustering import main_clusters
 from placegraph.nodes.fusion.mask_lifting import Observation
 from placegraph.nodes.fusion.object_cloud import ObjectCloud, VoxelContext
 from placegraph.nodes.fusion.spatial_index import is_nearer_to_second
 from placegraph.nodes.fusion.visibility import VisibilityConfig
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool
+from placegraph.runtime.vision.clustering import main_clusters
 from placegraph.runtime.vision.geometry import bounding_box, yaw_box
 
 # All three were chosen by hand.
 TRIM_PERCENT = 0.5  # of the points, that a box may lose to strays at each end of each axis
 MIN_MASK_SHARE = 0.3  # of the views that saw a point and the object, those whose mask held the point
 MIN_CLUSTER_SHARE = 0.2  # of the largest cluster's size; smaller clusters are leaks of masks onto the background
-STATIC_CONTEXT = VoxelContext(voxel_m=0.025)
+
+
+class KeyframeStamp(NamedTuple):
+    """When something was seen: the keyframe, counted from 0 over the run, its frame id and its submap."""
+
+    keyframe: int
+    frame_id: int
+    submap: int
 
 
 class ObjectGeometry(NamedTuple):
@@ -35,21 +43,13 @@ class ObjectGeometry(NamedTuple):
 class ObjectInstance:
     """An object as fusion knows it; it grows by observations and by merging with another."""
 
-    def __init__(
-        self,
-        object_id: int,
-        observation: Observation,
-        keyframe: int,
-        frame_id: int,
-        submap: int = 0,
-        context: VoxelContext = STATIC_CONTEXT,
-    ) -> None:
+    def __init__(self, object_id: int, observation: Observation, stamp: KeyframeStamp, context: VoxelContext) -> None:
         self.object_id = object_id  # never reused
-        self.cloud = ObjectCloud(observation.keys, observation.values, submap, context)
+        self.cloud = ObjectCloud(observation.keys, observation.values, stamp.submap, context)
         self.votes: dict[str, float] = {observation.name: observation.score}
         self.observations = 1
-        self.first_frame = self.last_frame = frame_id
-        self.last_keyframe = keyframe  # counted from 0 over the run
+        self.first_frame = self.last_frame = stamp.frame_id
+        self.last_keyframe = stamp.keyframe  # counted from 0 over the run
         self.times_visible = 1  # keyframes that showed it, whether or not it was recognised
         self.times_absent = 0  # keyframes that saw through most of it since it was last seen
         self.split_votes = 0  # views that showed two objects with a gap between them, less those that showed one
@@ -62,15 +62,15 @@ class ObjectInstance:
         """Forget which voxels the last keyframe saw: the next one may not show the object."""
         self._visible_keys = self._visible_keys[:0]
 
-    def update(self, observation: Observation, keyframe: int, frame_id: int, submap: int = 0) -> None:
+    def update(self, observation: Observation, stamp: KeyframeStamp) -> None:
         """Add one view. A second mask of the same keyframe adds points and votes but counts as no further view."""
-        if keyframe != self.last_keyframe:
+        if stamp.keyframe != self.last_keyframe:
             self.observations += 1
             self.cloud.count_visible(self._visible_keys)
-        self.last_keyframe, self.last_frame = keyframe, frame_id
+        self.last_keyframe, self.last_frame = stamp.keyframe, stamp.frame_id
         self.times_absent = 0
         self.votes[observation.name] = self.votes.get(observation.name, 0.0) + observation.score
-        self.cloud.add(observation.keys, observation.values, submap)
+        self.cloud.add(observation.keys, observation.values, stamp.submap)
         self._refresh()
 
     def merge(self, duplicate: ObjectInstance) -> None:
@@ -90,7 +90,7 @@ class ObjectInstance:
         """Move the points nearer to the second of `split_sides` to a new object with the same votes and views."""
         second = is_nearer_to_second(self.points, self.split_sides)
         new = copy(self)
-        new.object_id, new.votes, new.cloud = object_id, dict(self.votes), self.cloud.copy()
+        new.object_id, new.votes, new.cloud = object_id, dict(self.votes), deepcopy(self.cloud)
         new.cloud.remove(~second)
         self.cloud.remove(second)
         for instance in (self, new):
@@ -98,10 +98,10 @@ class ObjectInstance:
             instance._refresh()
         return new
 
-    def reintegrate(self) -> None:
-        """Follow submaps that have moved."""
+    def move_submaps(self, moves: Mapping[int, F64]) -> None:
+        """Follow submaps that have moved, see ObjectCloud."""
         self.times_absent = 0
-        self.cloud.reintegrate()
+        self.cloud.move_submaps(moves)
         self._refresh()
 
     def apply_visibility(self, seen_through: Bool, seen: Bool, config: VisibilityConfig) -> None:

@@ -51,18 +51,19 @@ class DepthVisibility:
 
     def rows_in_view(self, index: VoxelIndex) -> I32:
         """Rows of the voxels that may be in view and within reach."""
-        return index.rows_in_frustum(self._camera_from_world, self._slopes, self.config.reach_m)
+        return index.rows_near(self.box, self._spheres_in_view)
 
     def box_in_view(self, box_world: Points) -> bool:
         """Whether the sphere around a (2, 3) box may reach into the view, within reach."""
-        x, y, z = transform(self._camera_from_world, box_world.mean(axis=0)[None])[0].tolist()
         radius = float(np.linalg.norm(box_world[1] - box_world[0])) / 2
-        if not -radius < z < self.config.reach_m + radius:
-            return False
-        return all(
-            abs(across) - slope * max(z, 0) < radius * np.hypot(1, slope)
-            for across, slope in zip((x, y), self._slopes, strict=True)
-        )
+        return bool(self._spheres_in_view(box_world.mean(axis=0)[None], radius)[0])
+
+    def _spheres_in_view(self, centers_world: Points, radius: float) -> Bool:
+        x, y, z = transform(self._camera_from_world, centers_world).T
+        in_view = (z > -radius) & (z < self.config.reach_m + radius)
+        for across, slope in zip((x, y), self._slopes, strict=True):
+            in_view &= np.abs(across) - slope * np.maximum(z, 0) < radius * np.hypot(1, slope)
+        return np.asarray(in_view)
 
     def classify(self, points_world: Points) -> tuple[Bool, Bool]:
         """Two masks (N,) of points (N, 3): seen through, and seen. Points in neither are hidden or out of view."""

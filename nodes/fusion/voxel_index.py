@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from placegraph.runtime.arrays import F64, I32, I64, Points
+from placegraph.runtime.arrays import F64, I32, I64, Bool, Points
 from placegraph.runtime.errors import SchemaError
 
 D = TypeVar("D", bound=np.generic)
@@ -106,21 +107,15 @@ class VoxelIndex:
             at = np.searchsorted(known_keys, keys)
         return known_rows[at]
 
-    def rows_in_frustum(self, camera_from_world: F64, slopes: tuple[float, float], reach_m: float) -> I32:
-        """Rows of all blocks that may reach into a camera's view, in a fixed order.
+    def rows_near(self, box: Points, in_view: Callable[[F64, float], Bool]) -> I32:
+        """Rows of the blocks that reach into a box (2, 3) and are in view, in a fixed order.
 
-        slopes: largest |x| / z and |y| / z in the image; reach_m: how far the view goes along z.
+        in_view: centres (N, 3) and a radius to a mask (N,) of the spheres that are.
         """
-        position = -camera_from_world[:3, :3].T @ camera_from_world[:3, 3]
-        reach = reach_m * float(np.linalg.norm((1.0, *slopes)))
-        low, high = (np.floor((position + sign * reach) / self._block_m).astype(int) for sign in (-1, 1))
-        grid = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
-        blocks = grid.reshape(-1, 3)
-        x, y, z = camera_from_world[:3, :3] @ ((blocks + 0.5) * self._block_m).T + camera_from_world[:3, 3:]
-        radius = float(np.linalg.norm(self._block_m)) / 2
-        in_view = (z > -radius) & (z < reach_m + radius)
-        for across, slope in ((x, slopes[0]), (y, slopes[1])):
-            in_view &= np.abs(across) - slope * np.maximum(z, 0) < radius * np.hypot(1, slope)
-        keys = _pack(blocks[in_view] * _BLOCK).tolist()
+        low, high = np.floor(box / self._block_m).astype(int)
+        axes = (np.arange(first, last + 1) for first, last in zip(low, high, strict=True))
+        blocks = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        seen = in_view((blocks + 0.5) * self._block_m, float(np.linalg.norm(self._block_m)) / 2)
+        keys = _pack(blocks[seen] * _BLOCK).tolist()
         rows = [self._blocks[key][1] for key in keys if key in self._blocks]
         return np.concatenate(rows) if rows else np.zeros(0, np.int32)

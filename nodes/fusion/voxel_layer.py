@@ -1,10 +1,8 @@
 """Integer sums by voxel, kept by submap as well where the map may have to move after a loop closure.
 
 Sums of integers are exact: what a submap added can be subtracted and added elsewhere without a trace, and the order of
-additions does not matter.
-Source: re-integration of submaps after loop closure as in Voxgraph and Cartographer. Not as there: voxels are moved as
-points, not as distances, and a voxel keeps the contributions of a few submaps only, which bounds memory by the size of
-the map.
+additions does not matter. A voxel keeps the contributions of a few submaps only, which bounds memory by the size of the
+map.
 """
 
 from __future__ import annotations
@@ -14,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from placegraph.nodes.fusion.submap_voxels import SubmapVoxels
 from placegraph.nodes.fusion.voxel_index import VoxelIndex, block_keys, sum_by_key
 from placegraph.runtime.arrays import F64, I32, I64
 
@@ -21,26 +20,6 @@ D = TypeVar("D", bound=np.generic)
 
 MAX_SUBMAPS_PER_VOXEL = 4  # chosen by hand: more views of a voxel hardly change its mean
 MAX_POINTS_PER_VOXEL = 1 << 20  # where nothing is kept by submap: 32 bits hold the sums of so many points
-
-
-class _SubmapVoxels:
-    """What one submap added, as it was when it was fused: a piece for each keyframe, joined when it is closed."""
-
-    def __init__(self) -> None:
-        self.pieces: list[tuple[I64, I32]] = []  # sorted keys (N,) and sums (N, D)
-        self.world_from_fused: F64 = np.eye(4)
-
-    @property
-    def is_moved(self) -> bool:
-        """Whether the submap lies elsewhere than where it was fused."""
-        return not np.array_equal(self.world_from_fused, np.eye(4))
-
-    def totals(self) -> tuple[I64, I32]:
-        """All pieces as one: sorted keys (N,) and sums (N, D)."""
-        if len(self.pieces) > 1:
-            keys, values = (np.concatenate(column) for column in zip(*self.pieces, strict=True))
-            self.pieces = [sum_by_key(keys, values)]
-        return self.pieces[0]
 
 
 class VoxelLayer:
@@ -57,7 +36,7 @@ class VoxelLayer:
         self.sums: I32 = np.zeros((1024, columns), np.int32)
         self._submap_counts = np.zeros(1024, np.uint8)  # how many submaps contribute to a voxel
         self._latest_submap = np.full(1024, -1, np.int32)  # the last one that contributed
-        self._by_submap: dict[int, _SubmapVoxels] = {}
+        self._by_submap: dict[int, SubmapVoxels[np.int32]] = {}
         self._submaps_of_block: dict[int, set[int]] = {}  # closed submaps that may have voxels in a block
         self._removed_keys: list[I64] = []  # removed voxels that closed submaps still hold
         self._open_submap = -1
@@ -84,7 +63,7 @@ class VoxelLayer:
         self._submap_counts[rows[accepted & ~contributed]] += 1
         self._latest_submap[rows[accepted]] = submap
         if accepted.any():
-            self._by_submap.setdefault(submap, _SubmapVoxels()).pieces.append((keys[accepted], sums[accepted]))
+            self._by_submap.setdefault(submap, SubmapVoxels()).add(keys[accepted], sums[accepted])
         self._add_sums(rows[accepted], sums[accepted])
 
     def close_submap(self) -> None:
@@ -93,7 +72,7 @@ class VoxelLayer:
         self._open_submap = -1
         self._drop_removed(closed)
         if closed in self._by_submap:
-            self._index_blocks(closed, self._by_submap[closed].totals()[0])
+            self._index_blocks(closed, self._by_submap[closed].fused()[0])
 
     def remove(self, rows: I64) -> None:
         """Empty voxels, whichever submaps contributed to them."""
@@ -103,8 +82,7 @@ class VoxelLayer:
             return
         self._removed_keys.append(keys)
         if self._open_submap in self._by_submap:  # what it adds to these voxels from now on is new
-            voxels = self._by_submap[self._open_submap]
-            voxels.pieces = [(k[kept], v[kept]) for k, v in voxels.pieces for kept in [~np.isin(k, keys)]]
+            self._by_submap[self._open_submap].discard(keys, self.resample)
 
     def move_submap(self, submap: int, world_from_fused: F64) -> None:
         """Subtract what a submap added and add it where a rigid transform (4, 4) puts it now."""
@@ -128,11 +106,8 @@ class VoxelLayer:
         for name, fill in (("keys", 0), ("sums", 0), ("_submap_counts", 0), ("_latest_submap", -1)):
             setattr(self, name, with_capacity(getattr(self, name), size, fill))
 
-    def _resampled(self, voxels: _SubmapVoxels) -> tuple[I64, I32]:
-        return self.resample(*voxels.totals(), voxels.world_from_fused) if voxels.is_moved else voxels.totals()
-
-    def _add_submap(self, voxels: _SubmapVoxels, sign: int) -> I64:
-        keys, sums = sum_by_key(*self._resampled(voxels))
+    def _add_submap(self, voxels: SubmapVoxels[np.int32], sign: int) -> I64:
+        keys, sums = sum_by_key(*voxels.placed(self.resample))
         rows = self._rows(keys)
         self._submap_counts[rows] = np.clip(self._submap_counts[rows].astype(int) + sign, 0, 255)
         self._latest_submap[rows] = -1
@@ -147,17 +122,10 @@ class VoxelLayer:
         blocks = np.unique(block_keys(removed)).tolist()
         affected = set[int]().union(*(self._submaps_of_block.get(block, set()) for block in blocks))
         for submap in sorted(affected - {except_submap}):
-            voxels = self._by_submap[submap]
-            keys, sums = voxels.totals()
-            kept = ~np.isin(self._resampled(voxels)[0], removed)
-            voxels.pieces = [(keys[kept], sums[kept])]
-            if not kept.any():
-                self._forget_submap(submap)
-
-    def _forget_submap(self, submap: int) -> None:
-        del self._by_submap[submap]
-        for submaps in self._submaps_of_block.values():
-            submaps.discard(submap)
+            if not self._by_submap[submap].discard(removed, self.resample):
+                del self._by_submap[submap]
+                for submaps in self._submaps_of_block.values():
+                    submaps.discard(submap)
 
     def _index_blocks(self, submap: int, keys: I64) -> None:
         for block in np.unique(block_keys(keys)).tolist():

@@ -15,8 +15,8 @@ from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan, find_floor
 from placegraph.nodes.hierarchy.locations import LocationArea, LocationConfig, find_locations
 from placegraph.nodes.hierarchy.memo import Memo, digest
 from placegraph.nodes.hierarchy.object_rooms import FloorRoom, assign_rooms
-from placegraph.nodes.hierarchy.persistent_ids import PersistentIds, PlaceFootprint, height_footprint
-from placegraph.nodes.hierarchy.place_graph_builder import FloorPlan, PlacedObject, PlaceGraph, PlaceGraphBuilder
+from placegraph.nodes.hierarchy.persistent_ids import PersistentIds, height_outline
+from placegraph.nodes.hierarchy.place_graph_builder import FloorPlan, PlacedObject, PlaceGraphBuilder
 from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.nodes.hierarchy.rooms import RoomArea, RoomConfig, find_rooms
 from placegraph.nodes.hierarchy.traversability import TraversabilityConfig
@@ -69,18 +69,23 @@ class GraphBuilder:
             spans = find_floors(map_.object_points_world, map_.camera_positions_world, self._config.floors)
         points = map_.points_world if len(map_.points_world) else map_.object_points_world
         floor_ids = self._floor_ids.assign(
-            [PlaceFootprint(height_footprint(span.low, max(span.ceiling, span.low + 0.1))) for span in spans]
+            [("", height_outline(span.low, max(span.ceiling, span.low + 0.1))) for span in spans]
         )
         nodes: list[Node] = []
         rooms: list[FloorRoom] = []
         extents: list[_FloorExtent] = []
+        plans: list[FloorPlan] = []
         for i, (span, floor_id) in enumerate(zip(spans, floor_ids, strict=True)):
             floor_points, free = _in_zone(points, span), _in_zone(map_.free_points_world, span)
-            grid, areas, extent = self._find_rooms(floor_points, free, map_.free_cell_m, span)
+            key = digest(floor_points, free, map_.free_cell_m, span.low, span.high)
+            grid, areas, extent = self._find_rooms(key, floor_points, free, map_.free_cell_m, span)
             extents.append(extent)
-            ids = self._room_ids.assign([PlaceFootprint(area.outline, floor_id) for area in areas])
+            ids = self._room_ids.assign([(floor_id, area.outline) for area in areas])
             nodes.append(_place_node(floor_id, "B0", span, extent.outline, (Tag(f"floor {i + 1}", 1.0),)))
-            rooms += [FloorRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
+            floor_rooms = [FloorRoom(i, floor_id, span, grid, area) for i, area in zip(ids, areas, strict=True)]
+            rooms += floor_rooms
+            masks = tuple((room.id, room.area.mask) for room in floor_rooms)
+            plans.append(FloorPlan(floor_id, key, span, grid, floor_points, free, masks))
         nodes += [_place_node(room.id, room.floor_id, room.span, room.area.outline) for room in rooms]
         object_rooms = assign_rooms(objects, rooms)
         nodes += self._location_and_object_nodes(rooms, object_rooms, objects, items)
@@ -93,34 +98,20 @@ class GraphBuilder:
             for node in nodes
             if node.id in room_ids
         ]
-        places = self._place_graph(map_, list(zip(spans, floor_ids, strict=True)), rooms, placed)
+        places = self._places.build(map_, plans, placed)
         nodes = [replace(node, approach=places.approaches.get(node.id)) for node in nodes]
         return SceneGraph.of(nodes, places.connections, places.route_segments)
 
-    def _place_graph(
-        self, map_: Map, floors: list[tuple[FloorSpan, str]], rooms: list[FloorRoom], objects: list[PlacedObject]
-    ) -> PlaceGraph:
-        points = map_.points_world if len(map_.points_world) else map_.object_points_world
-        plans = []
-        for span, floor_id in floors:
-            floor_rooms = [room for room in rooms if room.floor_id == floor_id]
-            if not floor_rooms:
-                continue
-            floor_points, free = _in_zone(points, span), _in_zone(map_.free_points_world, span)
-            masks = tuple((room.id, room.area.mask) for room in floor_rooms)
-            plans.append(FloorPlan(floor_id, span, floor_rooms[0].grid, floor_points, free, masks))
-        return self._places.build(map_, plans, objects)
-
     def _find_rooms(
-        self, points: Points, free: Points, free_cell_m: float, span: FloorSpan
+        self, key: bytes, points: Points, free: Points, free_cell_m: float, span: FloorSpan
     ) -> tuple[PlanGrid, list[RoomArea], _FloorExtent]:
-        """Rooms of a floor and its own outline, found again only when its points, free space or heights changed."""
+        """Rooms of a floor and its own outline, found again only when the key of the other arguments changed."""
 
         def compute() -> tuple[PlanGrid, list[RoomArea], _FloorExtent]:
             extent = _FloorExtent(np.asarray(bounding_box(points), float), np.asarray(convex_footprint(points), float))
             return *find_rooms(points, free, free_cell_m, span, self._config.rooms), extent
 
-        return self._room_memo.get(digest(points, free, free_cell_m, span.low, span.high), compute)
+        return self._room_memo.get(key, compute)
 
     def _location_and_object_nodes(
         self, rooms: list[FloorRoom], object_rooms: list[FloorRoom], objects: list[Points], items: list[MapObject]
@@ -134,7 +125,7 @@ class GraphBuilder:
             (room, area) for room in rooms for area in self._find_locations(room, in_room[room.id], objects, digests)
         ]
         # all of them at once: an id goes to one place, also when a room is split
-        ids = self._location_ids.assign([PlaceFootprint(area.outline, room.floor_id) for room, area in areas])
+        ids = self._location_ids.assign([(room.floor_id, area.outline) for room, area in areas])
         parents = [room.id for room in object_rooms]
         nodes = []
         for location_id, (room, area) in zip(ids, areas, strict=True):

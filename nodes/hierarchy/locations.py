@@ -18,16 +18,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from pydantic import BaseModel, Field
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from placegraph.models_onnx import LocationDetector
 from placegraph.nodes.hierarchy.birds_eye_view import birds_eye_image
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.plan_grid import floor_grid
-from placegraph.runtime.arrays import F64, I64, Points
+from placegraph.nodes.hierarchy.plan_grid import close_gaps, floor_grid
+from placegraph.runtime.arrays import F64, Points
 from placegraph.runtime.errors import ConfigError
+from placegraph.runtime.vision.clustering import dbscan
 from placegraph.runtime.vision.geometry import convex_footprint
 
 
@@ -112,7 +110,9 @@ def _find_by_clustering(objects: Sequence[Points], span: FloorSpan, config: Loca
     owner = np.repeat(np.arange(len(objects)), [len(xyz) for xyz in banded])
     if not len(owner):
         return []
-    labels = _cluster(np.concatenate(banded), config)
+    points = np.concatenate(banded)
+    cells, cell_of = np.unique(np.floor(points / config.cell_m).astype(np.int64), axis=0, return_inverse=True)
+    labels = dbscan(cells, config.eps_m / config.cell_m, config.min_cells)[cell_of.reshape(-1)]
     members: dict[int, list[int]] = {}
     for i in range(len(objects)):
         votes = labels[(owner == i) & (labels >= 0)]
@@ -126,32 +126,12 @@ def _find_by_clustering(objects: Sequence[Points], span: FloorSpan, config: Loca
     ]
 
 
-def _cluster(points: Points, config: LocationConfig) -> I64:
-    """DBSCAN over occupied cells: label of each point (N,), -1 for noise."""
-    cells, cell_of = np.unique(np.floor(points / config.cell_m).astype(np.int64), axis=0, return_inverse=True)
-    pairs = cKDTree(cells).query_pairs(config.eps_m / config.cell_m, output_type="ndarray")
-    core = 1 + np.bincount(pairs.ravel(), minlength=len(cells)) >= config.min_cells
-    core_pairs = pairs[core[pairs].all(axis=1)]
-    links = coo_matrix(
-        (np.ones(len(core_pairs), bool), (core_pairs[:, 0], core_pairs[:, 1])), shape=(len(cells), len(cells))
-    )
-    _, labels = connected_components(links, directed=False)
-    labels = np.where(core, labels, -1).astype(np.int64)
-    for a, b in pairs[core[pairs].sum(axis=1) == 1].tolist():  # border cells join the core cell beside them
-        outer, inner = (a, b) if core[b] else (b, a)
-        labels[outer] = max(labels[outer], labels[inner])
-    return np.asarray(labels[cell_of.reshape(-1)])
-
-
 def _outline(objects: list[Points], config: LocationConfig) -> F64 | None:
     xy = np.concatenate(objects)[:, :2]
     cell = config.cell_m / 2
     reach = max(1, round(config.close_m / cell))
     grid = floor_grid(np.concatenate((xy - config.close_m, xy + config.close_m)), cell)
-    mask = np.zeros(grid.shape, np.uint8)
-    mask[grid.cells(xy)] = 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    outline = grid.outline(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel).astype(bool))
+    outline = grid.outline(close_gaps(grid.image(xy), reach))
     area = cv2.contourArea(outline.astype(np.float32))
     length = cv2.arcLength(outline.astype(np.float32), True)
     if area < config.min_area_m2 or 4 * np.pi * area < config.compactness * length**2:

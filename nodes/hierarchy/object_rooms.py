@@ -57,8 +57,6 @@ def _label_image(rooms: list[FloorRoom]) -> I32:
 
 def _nearest(xyz: Points, rooms: list[FloorRoom]) -> FloorRoom:
     def distance_m(room: FloorRoom) -> float:
-        rows, columns = np.nonzero(room.area.mask)
-        cells = room.grid.origin + (np.stack((columns, rows), axis=1) + 0.5) * room.grid.cell_m
-        return float(np.linalg.norm(cells - xyz[:2], axis=1).min())
+        return float(np.linalg.norm(room.grid.centers(*np.nonzero(room.area.mask)) - xyz[:2], axis=1).min())
 
     return min(rooms, key=distance_m)

@@ -49,7 +49,7 @@ class ShortestPaths:
             chain.append(divmod(at, width))
             at = int(self._predecessors[start].flat[at])
         corners = _straighten(np.array(chain[::-1]), self._free)
-        return self._grid.origin + (corners[:, ::-1] + 0.5) * self._grid.cell_m
+        return self._grid.centers(corners[:, 0], corners[:, 1])
 
 
 def shortest_paths(starts: Sequence[tuple[int, int]], free: Bool, grid: PlanGrid) -> ShortestPaths:

@@ -6,17 +6,18 @@ Rooms that did not change keep what was found for them in the build before. The 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from placegraph.nodes.hierarchy.approach_poses import ApproachCell, ApproachTarget, find_approach
 from placegraph.nodes.hierarchy.floors import FloorConfig, FloorSpan
+from placegraph.nodes.hierarchy.memo import Memo, digest
 from placegraph.nodes.hierarchy.openings import Opening, find_openings, grow_rooms
 from placegraph.nodes.hierarchy.path_planning import ShortestPaths, path_length_m, shortest_paths
-from placegraph.nodes.hierarchy.persistent_ids import PersistentIds, PlaceFootprint
+from placegraph.nodes.hierarchy.persistent_ids import PersistentIds
 from placegraph.nodes.hierarchy.plan_grid import PlanGrid
 from placegraph.nodes.hierarchy.rooms import RoomConfig
 from placegraph.nodes.hierarchy.stairs import Stairs, find_stairs, path_segments_on, standing_floors
@@ -26,7 +27,7 @@ from placegraph.nodes.hierarchy.traversability import (
     compute_traversability,
     drop_off_points,
 )
-from placegraph.runtime.arrays import F64, I32, I64, U8, Bool, Points
+from placegraph.runtime.arrays import F64, I32, I64, Bool, Points
 from placegraph.runtime.messages import Map
 from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 
@@ -39,11 +40,16 @@ class FloorPlan:
     """One floor as the room layer has it: its points and free cells (N, 3), and each room's id and mask."""
 
     id: str
+    key: bytes  # differs where the points, free cells or heights differ
     span: FloorSpan
     grid: PlanGrid
     points_world: Points
     free_points_world: Points
     rooms: tuple[tuple[str, Bool], ...]
+
+    def position(self, cell: tuple[int, int]) -> F64:
+        """(3,) metres, world, of a cell (row, column) on the floor."""
+        return np.array([*self.grid.centers(*np.array(cell)), self.span.low])
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,47 +71,33 @@ class PlaceGraph:
 
 
 @dataclass(frozen=True, eq=False)
-class _FloorConnections:
-    """What was found for one floor, and from which inputs; with equal inputs it is not computed again."""
+class _FloorOpenings:
+    """What was found for one floor, whatever the ids of its rooms."""
 
-    plan: FloorPlan
     traversability: TraversabilityMap
     room_of_cell: I32
     openings: list[Opening]
-    inputs: tuple[NDArray[Any], ...]
-
-    def position(self, cell: tuple[int, int]) -> F64:
-        center = self.plan.grid.origin + (np.array(cell[::-1]) + 0.5) * self.plan.grid.cell_m
-        return np.array([*center, self.plan.span.low])
 
 
-@dataclass(eq=False)
-class _ConnectionDraft:
-    """A connection before it has an id, with the cell where it begins in each of its rooms."""
+@dataclass(frozen=True, eq=False)
+class _PlacedConnection:
+    """A connection, the cell where it begins in each of its rooms, and the floors that it cannot leave."""
 
-    kind: str
-    rooms: tuple[str, str]
+    connection: Connection
     cells: tuple[tuple[int, int], tuple[int, int]]
-    ends: F64
-    width_m: float
-    length_m: float
     group: str
     boundary: Bool | None = None  # of an opening: cells that paths in both rooms may use
-    id: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class _RoomPaths:
-    """What was found for one room, and from which inputs."""
+    """Where a robot can stand in a room, and its paths from the ends: connections, then the room's own centre."""
 
-    connection_ids: tuple[str, ...]
+    key: bytes
+    ends: list[str]
     standable: Bool
-    obstacle_levels: U8
-    paths: ShortestPaths
-    center: tuple[int, int] | None
     reachable: Bool
-    route_segments: dict[tuple[str, str], RouteSegment] = field(default_factory=dict)
-    approach_cells: dict[str, tuple[ApproachTarget, ApproachCell | None]] = field(default_factory=dict)
+    paths: ShortestPaths
 
 
 class PlaceGraphBuilder:
@@ -114,179 +106,157 @@ class PlaceGraphBuilder:
     def __init__(self, config: TraversabilityConfig, floors: FloorConfig, rooms: RoomConfig) -> None:
         self._config, self._floor_config, self._door_m = config, floors, rooms.door_m
         self._connection_ids = PersistentIds("C")
-        self._floors: dict[str, _FloorConnections] = {}
-        self._rooms: dict[str, _RoomPaths] = {}
+        self._floor_memo: Memo[_FloorOpenings] = Memo()
+        self._path_memo: Memo[ShortestPaths] = Memo()
+        self._segment_memo: Memo[F64] = Memo()
+        self._approach_memo: Memo[ApproachCell | None] = Memo()
 
     def build(self, map_: Map, plans: Sequence[FloorPlan], objects: Sequence[PlacedObject]) -> PlaceGraph:
         """Connections, route segments and approaches of a map. Deterministic in the sequence of maps."""
         spans = [plan.span for plan in plans]
         standing = standing_floors(map_.camera_positions_world, spans, self._floor_config, self._config)
-        floors = [self._floor(map_, plan, number, standing) for number, plan in enumerate(plans)]
-        self._floors = {floor.plan.id: floor for floor in floors}
-        connections = self._connections(map_, floors, spans, standing)
+        floors = [(plan, self._find_openings(map_, plan, number, standing)) for number, plan in enumerate(plans)]
+        stairs = find_stairs(map_.camera_positions_world, standing, spans, map_.points_world, self._config)
+        connections = self._connections(floors, stairs)
         route_segments: list[RouteSegment] = []
         approaches: dict[str, Approach] = {}
-        previous, self._rooms = self._rooms, {}
-        for floor in floors:
-            for number, (room_id, _) in enumerate(floor.plan.rooms):
-                in_room = [connection for connection in connections if room_id in connection.rooms]
-                room = self._room_paths(floor, number, room_id, in_room, previous.get(room_id))
-                self._rooms[room_id] = room
-                ends = [connection.id for connection in in_room] + [room_id] * (room.center is not None)
-                route_segments += _route_segments(room_id, ends, room)
-                room_objects = [placed for placed in objects if placed.room_id == room_id]
-                approaches |= self._approaches(floor, room, ends, room_objects)
-        return PlaceGraph([_connection(draft) for draft in connections], route_segments, approaches)
+        for plan, floor in floors:
+            for number, (room_id, _) in enumerate(plan.rooms):
+                in_room = [item for item in connections if room_id in item.connection.rooms]
+                room = self._room_paths(plan, floor, number, in_room)
+                route_segments += self._route_segments(room_id, room)
+                levels = np.where(floor.room_of_cell == number, floor.traversability.obstacle_levels, 0)
+                key = digest(room.key, levels)
+                for placed in [placed for placed in objects if placed.room_id == room_id]:
+                    if (approach := self._approach(plan, floor, room, key, placed.target)) is not None:
+                        approaches[placed.id] = approach
+        for memo in (self._floor_memo, self._path_memo, self._segment_memo, self._approach_memo):
+            memo.end_build()
+        return PlaceGraph([item.connection for item in connections], route_segments, approaches)
 
-    def _connections(
-        self, map_: Map, floors: list[_FloorConnections], spans: list[FloorSpan], standing: I64
-    ) -> list[_ConnectionDraft]:
-        drafts = [draft for floor in floors for draft in self._openings(floor)]
-        for stairs in find_stairs(map_.camera_positions_world, standing, spans, map_.points_world, self._config):
-            if (draft := self._stairs(stairs, floors)) is not None:
-                drafts.append(draft)
-        footprints = [PlaceFootprint(_square(draft.ends.mean(axis=0)), draft.group) for draft in drafts]
-        for draft, connection_id in zip(drafts, self._connection_ids.assign(footprints), strict=True):
-            draft.id = connection_id
-        return sorted(drafts, key=lambda draft: int(draft.id[1:]))
-
-    def _floor(self, map_: Map, plan: FloorPlan, number: int, standing: I64) -> _FloorConnections:
+    def _find_openings(self, map_: Map, plan: FloorPlan, number: int, standing: I64) -> _FloorOpenings:
         segments = path_segments_on(number, map_.camera_positions_world, standing, self._config)
         drop_offs = drop_off_points(map_.points_world, plan.span, self._config)
-        masks = [mask for _, mask in plan.rooms]
-        points, free = plan.points_world, plan.free_points_world
-        inputs: tuple[Points | Bool, ...] = (points, drop_offs, free, segments, plan.grid.origin, *masks)
-        previous = self._floors.get(plan.id)
-        if previous is not None and previous.plan.span == plan.span and _equal(previous.inputs, inputs):
-            return _FloorConnections(plan, previous.traversability, previous.room_of_cell, previous.openings, inputs)
-        traversability = compute_traversability(
-            points, drop_offs, free, map_.free_cell_m, segments, plan.grid, plan.span, self._config
-        )
-        room_of_cell = grow_rooms(masks, traversability, self._config)
-        openings = find_openings(room_of_cell, traversability, self._config)
-        return _FloorConnections(plan, traversability, room_of_cell, openings, inputs)
 
-    def _openings(self, floor: _FloorConnections) -> list[_ConnectionDraft]:
-        def draft(opening: Opening) -> _ConnectionDraft:
-            first, second = (floor.plan.rooms[number][0] for number in opening.rooms)
-            kind = "door" if opening.width_m < self._door_m else "opening"
-            ends = np.stack([floor.position(opening.cell)] * 2)
-            cells = (opening.cell, opening.cell)
-            return _ConnectionDraft(
-                kind, (first, second), cells, ends, opening.width_m, 0.0, floor.plan.id, opening.boundary
+        def compute() -> _FloorOpenings:
+            traversability = compute_traversability(
+                plan.points_world,
+                drop_offs,
+                plan.free_points_world,
+                map_.free_cell_m,
+                segments,
+                plan.grid,
+                plan.span,
+                self._config,
             )
+            room_of_cell = grow_rooms([mask for _, mask in plan.rooms], traversability, self._config)
+            openings = find_openings(room_of_cell, traversability, self._config)
+            return _FloorOpenings(traversability, room_of_cell, openings)
 
-        return [draft(opening) for opening in floor.openings]
+        return self._floor_memo.get(digest(plan.key, drop_offs, segments), compute)
 
-    def _stairs(self, stairs: Stairs, floors: Sequence[_FloorConnections]) -> _ConnectionDraft | None:
-        """Stairs between the rooms in which they end; None where an end lies in no room."""
-        rooms, cells, ends = [], [], []
-        for number, end in zip(stairs.floors, stairs.ends, strict=True):
-            floor = floors[number]
-            grid = floor.plan.grid
-            rows, columns = np.nonzero(floor.traversability.standable & (floor.room_of_cell >= 0))
-            apart = np.hypot(*(grid.origin + (np.stack((columns, rows), 1) + 0.5) * grid.cell_m - end[:2]).T)
-            if not len(apart) or apart.min() > STAIRS_ROOM_M:
-                return None
-            nearest = int(np.argmin(apart))
-            cells.append((int(rows[nearest]), int(columns[nearest])))
-            rooms.append(floor.plan.rooms[int(floor.room_of_cell[cells[-1]])][0])
-            ends.append(floor.position(cells[-1]))
-        length = max(stairs.length_m, float(np.linalg.norm(ends[1] - ends[0])))
-        group = " ".join(floors[number].plan.id for number in stairs.floors)
-        return _ConnectionDraft(
-            "stairs", (rooms[0], rooms[1]), (cells[0], cells[1]), np.stack(ends), stairs.width_m, length, group
+    def _connections(
+        self, floors: Sequence[tuple[FloorPlan, _FloorOpenings]], stairs: Sequence[Stairs]
+    ) -> list[_PlacedConnection]:
+        """All connections with their ids, in the order of these."""
+        found = [self._door(plan, opening) for plan, floor in floors for opening in floor.openings]
+        found += [item for item in (_join_floors(flight, floors) for flight in stairs) if item is not None]
+        squares = [(item.group, _square(item.connection.ends.mean(axis=0))) for item in found]
+        ids = self._connection_ids.assign(squares)
+        found = [
+            replace(item, connection=replace(item.connection, id=connection_id))
+            for item, connection_id in zip(found, ids, strict=True)
+        ]
+        return sorted(found, key=lambda item: int(item.connection.id[1:]))
+
+    def _door(self, plan: FloorPlan, opening: Opening) -> _PlacedConnection:
+        first, second = (plan.rooms[number][0] for number in opening.rooms)
+        connection = Connection(
+            id="",
+            kind="door" if opening.width_m < self._door_m else "opening",
+            rooms=(first, second),
+            ends=np.stack([plan.position(opening.cell)] * 2),
+            width_m=opening.width_m,
+            length_m=0.0,
         )
+        return _PlacedConnection(connection, (opening.cell, opening.cell), plan.id, opening.boundary)
 
     def _room_paths(
-        self,
-        floor: _FloorConnections,
-        number: int,
-        room_id: str,
-        connections: list[_ConnectionDraft],
-        previous: _RoomPaths | None,
+        self, plan: FloorPlan, floor: _FloorOpenings, number: int, connections: Sequence[_PlacedConnection]
     ) -> _RoomPaths:
+        room_id = plan.rooms[number][0]
         standable = floor.room_of_cell == number
-        for connection in connections:
-            if connection.boundary is not None:
-                standable = standable | connection.boundary
+        for item in connections:
+            if item.boundary is not None:
+                standable = standable | item.boundary
         standable = standable & floor.traversability.standable
-        cells = [connection.cells[connection.rooms.index(room_id)] for connection in connections]
-        levels = np.where(floor.room_of_cell == number, floor.traversability.obstacle_levels, 0).astype(np.uint8)
-        center = _widest_cell(standable, floor.traversability)
-        starts = (*cells, *([center] if center else []))
-        ids = tuple(connection.id for connection in connections)
-        same_ends = previous is not None and (previous.connection_ids, previous.paths.starts) == (ids, starts)
-        if previous is not None and same_ends and np.array_equal(previous.standable, standable):
-            if np.array_equal(previous.obstacle_levels, levels):
-                return previous
-            return _RoomPaths(
-                ids, standable, levels, previous.paths, center, previous.reachable, previous.route_segments
-            )
-        paths = shortest_paths(starts, standable, floor.plan.grid)
+        starts = [item.cells[item.connection.rooms.index(room_id)] for item in connections]
+        ends = [item.connection.id for item in connections]
+        if standable.any():
+            starts.append(_widest_cell(standable, floor.traversability))
+            ends.append(room_id)
+        key = digest(standable, np.array(starts), plan.grid.origin)
+        paths = self._path_memo.get(key, lambda: shortest_paths(starts, standable, plan.grid))
         # a room without connections: what is connected to its centre
-        reachable = np.asarray(np.isfinite(paths.distance_m[: len(cells) or None]).any(axis=0))
-        return _RoomPaths(ids, standable, levels, paths, center, reachable)
+        reachable = np.asarray(np.isfinite(paths.distance_m[: len(connections) or None]).any(axis=0))
+        return _RoomPaths(key, ends, standable, reachable, paths)
 
-    def _approaches(
-        self, floor: _FloorConnections, room: _RoomPaths, ends: list[str], objects: Sequence[PlacedObject]
-    ) -> dict[str, Approach]:
-        approaches = {}
-        for placed in objects:
-            cached = room.approach_cells.get(placed.id)
-            if cached is None or not _same_target(cached[0], placed.target):
-                approach_cell = find_approach(
-                    placed.target, room.standable, room.reachable, floor.traversability, self._config
-                )
-                cached = room.approach_cells[placed.id] = (placed.target, approach_cell)
-            approach = cached[1]
-            if approach is None:
-                continue
-            x, y, z = floor.position(approach.cell).tolist()
-            lengths = room.paths.distance_m[:, approach.cell[0], approach.cell[1]].tolist()
-            travel = sorted((end, length) for end, length in zip(ends, lengths, strict=True) if np.isfinite(length))
-            approaches[placed.id] = Approach((x, y, z), approach.yaw_rad, tuple(travel))
-        return approaches
+    def _route_segments(self, room_id: str, room: _RoomPaths) -> list[RouteSegment]:
+        segments = []
+        for i, j in combinations(range(len(room.ends)), 2):
+            end = room.paths.starts[j]
+            if np.isfinite(room.paths.distance_m[i][end]):
+                points = self._segment_memo.get(digest(room.key, i, j), partial(room.paths.path, i, end))
+                ends = (room.ends[i], room.ends[j])
+                segments.append(RouteSegment(room=room_id, ends=ends, length_m=path_length_m(points), points=points))
+        return segments
+
+    def _approach(
+        self, plan: FloorPlan, floor: _FloorOpenings, room: _RoomPaths, key: bytes, target: ApproachTarget
+    ) -> Approach | None:
+        """Where to stand before an object; key: differs where the room or its obstacles differ."""
+        found = self._approach_memo.get(
+            digest(key, target.footprint, target.center),
+            lambda: find_approach(target, room.standable, room.reachable, floor.traversability, self._config),
+        )
+        if found is None:
+            return None
+        x, y, z = plan.position(found.cell).tolist()
+        lengths = room.paths.distance_m[:, found.cell[0], found.cell[1]].tolist()
+        travel = sorted((end, length) for end, length in zip(room.ends, lengths, strict=True) if np.isfinite(length))
+        return Approach((x, y, z), found.yaw_rad, tuple(travel))
 
 
-def _equal(a: Sequence[NDArray[Any]], b: Sequence[NDArray[Any]]) -> bool:
-    return len(a) == len(b) and all(map(np.array_equal, a, b))
-
-
-def _same_target(a: ApproachTarget, b: ApproachTarget) -> bool:
-    return np.array_equal(a.center, b.center) and np.array_equal(a.footprint, b.footprint)
+def _join_floors(flight: Stairs, floors: Sequence[tuple[FloorPlan, _FloorOpenings]]) -> _PlacedConnection | None:
+    """Stairs between the rooms in which they end; None where an end lies in no room."""
+    rooms, cells, ends = [], [], []
+    for number, end in zip(flight.floors, flight.ends, strict=True):
+        plan, floor = floors[number]
+        rows, columns = np.nonzero(floor.traversability.standable & (floor.room_of_cell >= 0))
+        apart = np.hypot(*(plan.grid.centers(rows, columns) - end[:2]).T)
+        if not len(apart) or apart.min() > STAIRS_ROOM_M:
+            return None
+        nearest = int(np.argmin(apart))
+        cells.append((int(rows[nearest]), int(columns[nearest])))
+        rooms.append(plan.rooms[int(floor.room_of_cell[cells[-1]])][0])
+        ends.append(plan.position(cells[-1]))
+    connection = Connection(
+        id="",
+        kind="stairs",
+        rooms=(rooms[0], rooms[1]),
+        ends=np.stack(ends),
+        width_m=flight.width_m,
+        length_m=max(flight.length_m, float(np.linalg.norm(ends[1] - ends[0]))),
+    )
+    group = " ".join(floors[number][0].id for number in flight.floors)
+    return _PlacedConnection(connection, (cells[0], cells[1]), group)
 
 
 def _square(center: F64) -> F64:
     return center[:2] + CONNECTION_HALF_M * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 
-def _widest_cell(standable: Bool, floor: TraversabilityMap) -> tuple[int, int] | None:
+def _widest_cell(standable: Bool, floor: TraversabilityMap) -> tuple[int, int]:
     """The standable cell of a room that is furthest from obstacles; the first of several."""
-    if not standable.any():
-        return None
     row, column = np.unravel_index(int(np.argmax(np.where(standable, floor.clearance_m, -1))), standable.shape)
     return int(row), int(column)
-
-
-def _route_segments(room_id: str, ends: list[str], room: _RoomPaths) -> list[RouteSegment]:
-    paths = room.paths
-    for i in range(len(ends)):
-        for j in range(i + 1, len(ends)):
-            pair = (ends[i], ends[j])
-            if pair not in room.route_segments and np.isfinite(paths.distance_m[i][paths.starts[j]]):
-                points = paths.path(i, paths.starts[j])
-                length = path_length_m(points)
-                room.route_segments[pair] = RouteSegment(room=room_id, ends=pair, length_m=length, points=points)
-    return list(room.route_segments.values())
-
-
-def _connection(draft: _ConnectionDraft) -> Connection:
-    return Connection(
-        id=draft.id,
-        kind=draft.kind,
-        rooms=draft.rooms,
-        ends=draft.ends,
-        width_m=draft.width_m,
-        length_m=draft.length_m,
-    )

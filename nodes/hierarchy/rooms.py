@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.plan_grid import PlanGrid, floor_grid
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid, close_gaps, floor_grid
 from placegraph.nodes.hierarchy.watershed import Neck, watershed
 from placegraph.runtime.arrays import F32, F64, I32, Bool, Points
 
@@ -79,15 +79,13 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: PlanGrid, config: Roo
     if high - low < config.min_slice_m:
         low, high = config.partial_low_m, max(span.high - span.low, config.partial_low_m + config.level_m)
     tall = (above >= low) & (above <= high)
-    rows, columns = grid.cells(points_world[tall])
+    points = points_world[tall]
     levels = np.floor((above[tall] - low) / config.level_m).astype(np.int64)
     kernel = np.ones((3, 3), np.uint8)
     filled = np.zeros(grid.shape, np.uint8)  # a cell's number of levels
     for level in range(int(levels.max(initial=-1)) + 1):
-        at_level, occupied = levels == level, np.zeros(grid.shape, np.uint8)
-        occupied[rows[at_level], columns[at_level]] = 1
         # a wall seen from a few places has holes: it is dilated here, and eroded by as much below
-        filled += np.asarray(cv2.dilate(occupied, kernel), bool)
+        filled += np.asarray(cv2.dilate(grid.image(points[levels == level]), kernel), np.uint8)
     wide = (filled >= round(config.wall_fill_m / config.level_m)).astype(np.uint8)
     walls = cv2.erode(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, kernel), kernel)
     return keep_walls(np.asarray(walls, bool), config)
@@ -95,15 +93,8 @@ def wall_mask(points_world: Points, span: FloorSpan, grid: PlanGrid, config: Roo
 
 def observed_mask(points: Points, free_points: Points, free_cell_m: float, grid: PlanGrid, config: RoomConfig) -> Bool:
     """Cells that a ray crossed or that hold a point, small gaps closed."""
-    seen = np.zeros(grid.shape, np.uint8)
-    seen[grid.cells(free_points)] = 1
-    side = max(1, int(np.ceil(free_cell_m / grid.cell_m))) | 1  # a free cell is wider than a pixel
-    wide = np.asarray(cv2.dilate(seen, np.ones((side, side), np.uint8)))
-    wide[grid.cells(points)] = 1
-    reach = max(1, round(config.close_m / grid.cell_m))
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    padded = cv2.copyMakeBorder(wide, reach, reach, reach, reach, cv2.BORDER_CONSTANT, value=0)
-    return cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[reach:-reach, reach:-reach].astype(bool)
+    observed = grid.image(free_points, free_cell_m) | grid.image(points)
+    return close_gaps(observed, max(1, round(config.close_m / grid.cell_m)))
 
 
 def keep_walls(occupied: Bool, config: RoomConfig) -> Bool:

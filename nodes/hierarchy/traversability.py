@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from placegraph.nodes.hierarchy.floors import FloorSpan
-from placegraph.nodes.hierarchy.plan_grid import PlanGrid
+from placegraph.nodes.hierarchy.plan_grid import PlanGrid, close_gaps
 from placegraph.runtime.arrays import F32, F64, I64, U8, Bool, Points
 
 LEVEL_M = 0.1  # step in which heights of obstacles are kept
@@ -79,8 +79,8 @@ def compute_traversability(
     obstacle = _obstacles(_count(obstacle_points, grid), config)
     path = _path_cells(path_segments_world, grid)
     free = _free_cells(free_points_world, free_cell_m, grid, span, config)
-    floor = _count(points_world[np.abs(above) <= config.floor_band_m], grid) > 0
-    floor = _close_gaps(floor, round(config.close_m / grid.cell_m))
+    floor_points = points_world[np.abs(above) <= config.floor_band_m]
+    floor = close_gaps(grid.image(floor_points), round(config.close_m / grid.cell_m))
     floor |= _blind_spots(path, drop_off_points_world, grid, config)
     # the camera was carried here: the robot's width around its path is free, too, where nothing was seen to stand
     crossed = _dilate(path, config.robot_radius_m / grid.cell_m + 1)
@@ -130,28 +130,18 @@ def _path_cells(segments: F64, grid: PlanGrid) -> Bool:
 
 def _free_cells(points: Points, cell_m: float, grid: PlanGrid, span: FloorSpan, config: TraversabilityConfig) -> Bool:
     above = points[:, 2] - span.low
-    image = np.zeros(grid.shape, np.uint8)
-    image[grid.cells(points[(above > 0) & (above < config.robot_height_m)])] = 1
-    side = max(1, int(np.ceil(cell_m / grid.cell_m))) | 1  # a free cell is wider than a pixel
-    return np.asarray(cv2.dilate(image, np.ones((side, side), np.uint8))) > 0
+    return grid.image(points[(above > 0) & (above < config.robot_height_m)], cell_m) > 0
 
 
 def _blind_spots(path: Bool, drop_offs: Points, grid: PlanGrid, config: TraversabilityConfig) -> Bool:
     """Cells near the path, except where the ground falls away: a downward stair shows its treads and sides."""
-    drop = _dilate(_count(drop_offs, grid) > 0, config.close_m / grid.cell_m)
+    drop = _dilate(grid.image(drop_offs) > 0, config.close_m / grid.cell_m)
     return _dilate(path, config.blind_m / grid.cell_m) & ~drop
 
 
 def _dilate(mask: Bool, cells: float) -> Bool:
     distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.asarray(distance <= cells) & bool(mask.any())
-
-
-def _close_gaps(mask: Bool, reach: int) -> Bool:
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    padded = np.pad(mask, reach).astype(np.uint8)
-    closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)
-    return np.asarray(closed[reach : reach + mask.shape[0], reach : reach + mask.shape[1]]) > 0
 
 
 def _clearance(passable: Bool, cell_m: float) -> F32:

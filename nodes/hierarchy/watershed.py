@@ -62,7 +62,7 @@ class _Basins:
         self._separates = separates
         self._seed_levels: list[float] = [0.0]  # by basin; there is no basin 0
         self._merged_into = [0]  # by basin: itself, or the basin that it was merged into
-        self._separated: set[tuple[int, int]] = set()
+        self._separated: set[frozenset[int]] = set()
 
     def expand(self, cells: I64) -> I64:
         """Expand basins into cells, one ring at a time, and return the cells that none reaches.
@@ -116,19 +116,16 @@ class _Basins:
             self._merge_or_separate(self._root(a), self._root(b), cell, level)
 
     def _merge_or_separate(self, a: int, b: int, cell: int, level: float) -> None:
-        pair = (min(a, b), max(a, b))
+        pair = frozenset((a, b))
         if a == b or pair in self._separated:
             return
         row_column = (cell // self._width - 1, cell % self._width - 1)
         if self._separates(Neck(row_column, level, (self._seed_levels[a], self._seed_levels[b]))):
             self._separated.add(pair)
             return
-        kept, merged = pair if self._seed_levels[pair[0]] >= self._seed_levels[pair[1]] else pair[::-1]
+        merged, kept = sorted(pair, key=lambda basin: (self._seed_levels[basin], -basin))
         self._merged_into[merged] = kept
-        for separated in [separated for separated in self._separated if merged in separated]:
-            self._separated.discard(separated)
-            neighbor = separated[0] if separated[1] == merged else separated[1]
-            self._separated.add((min(kept, neighbor), max(kept, neighbor)))
+        self._separated = {basins - {merged} | {kept} if merged in basins else basins for basins in self._separated}
 
     def _root(self, basin: int) -> int:
         while self._merged_into[basin] != basin:

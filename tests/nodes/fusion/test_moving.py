@@ -177,10 +177,9 @@ def test_memory_is_bounded_by_the_map_and_not_by_how_often_it_was_seen(view):
             frame_id = 4 * lap + k
             for message in (keyframe, segments, correction(frame_id, keyframe.world_from_camera)):
                 node.step(dataclasses.replace(message, frame_id=frame_id))
-        parts = [part.totals()[0] for layer in (node._voxels, node._free) for part in layer._by_submap.values()]
-        clouds = [
-            keys for instance in node._objects.instances.values() for keys, _ in instance.cloud._by_submap.values()
-        ]
+        parts = [part.fused()[0] for layer in (node._voxels, node._free) for part in layer._by_submap.values()]
+        instances = node._objects.instances.values()
+        clouds = [part.fused()[0] for instance in instances for part in instance.cloud._by_submap.values()]
         sizes.append(sum(map(len, parts)) + sum(map(len, clouds)))
     assert sizes[-1] == sizes[3] < 2 * sizes[0]
 

@@ -43,7 +43,7 @@ def test_cells_that_every_submap_has_lost_leave_no_submap_behind():
     one.remove(one.occupied_rows())
     one.close_submap()
     assert len(one) == 0 and list(one._by_submap) == [1]  # the open one, which is empty
-    assert all(len(keys) == 0 for keys, _ in one._by_submap[1].pieces)
+    assert not len(one._by_submap[1].fused()[0])
 
 
 def test_enlarged_arrays_keep_what_they_hold():

@@ -52,6 +52,14 @@ def test_box_iou_and_distance() -> None:
     assert g.box_iou(point, point) == 0
 
 
+def test_box_iou_of_many_boxes_in_an_image() -> None:
+    box = np.array([[0, 0], [2, 2]], np.float32)
+    boxes = np.array([[[0, 0], [2, 2]], [[1, 0], [3, 2]], [[2, 2], [4, 4]], [[1, 1], [1, 1]]], np.float32)
+    np.testing.assert_allclose(g.box_iou(box, boxes), [1, 1 / 3, 0, 0])
+    assert g.box_iou(box, boxes).dtype == np.float32 and g.box_iou(box, boxes[:0]).shape == (0,)
+    assert g.box_iou(boxes[:, None], boxes[None, :2]).shape == (4, 2)
+
+
 def test_yaw_box_of_one_point_and_of_a_turned_rectangle() -> None:
     assert np.allclose(g.yaw_box(np.array([[1.0, 2.0, 3.0]])), [1, 2, 3, 0, 0, 0, 0], atol=1e-6)
     yaw = 0.3

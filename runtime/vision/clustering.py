@@ -33,7 +33,8 @@ def dbscan(points: Points, eps: float, min_points: int) -> I64:
     )
     _, core_labels = connected_components(links, directed=False)
     border = np.flatnonzero(degree < min_points)
-    distance, nearest = cKDTree(points[core]).query(points[border], distance_upper_bound=eps)
+    upper_bound = np.nextafter(eps, np.inf)  # scipy excludes the bound itself, which a core point's reach includes
+    distance, nearest = cKDTree(points[core]).query(points[border], distance_upper_bound=upper_bound)
     labels[core] = core_labels
     near = np.isfinite(distance)
     labels[border[near]] = core_labels[nearest[near]]

@@ -1,6 +1,6 @@
 import numpy as np
 
-from placegraph.nodes.fusion.clustering import dbscan, main_clusters
+from placegraph.runtime.vision.clustering import dbscan, main_clusters
 
 
 def line(start, count):
