@@ -80,11 +80,7 @@ def mask_losses(logits: Tensor, quality: Tensor, masks: Tensor, inside: Tensor) 
     with torch.no_grad():
         hit, true = (logits > 0) * inside, masks * inside
         true_iou = (hit * true).sum((1, 2, 3)) / ((hit + true) > 0).sum((1, 2, 3)).clamp(min=1)
-    return {
-        "entropy": entropy,
-        "dice": dice.mean(),
-        "quality": functional.l1_loss(quality[:, 0], true_iou) * 0.2,
-    }
+    return {"entropy": entropy, "dice": dice.mean(), "quality": functional.l1_loss(quality[:, 0], true_iou) * 0.2}
 
 
 def train_masks(data: Path, checkpoint: Path, steps: int, seed: int = 2, threads: int = 2) -> MaskNetwork:

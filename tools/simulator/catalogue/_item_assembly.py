@@ -9,13 +9,7 @@ import numpy as np
 from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.catalogue._materials import Random, Size
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
-from placegraph.tools.simulator.mesh_primitives import (
-    Point,
-    extrude,
-    lathe,
-    moved,
-    turned,
-)
+from placegraph.tools.simulator.mesh_primitives import Point, extrude, lathe, moved, turned
 
 Outline = Sequence[tuple[float, float]]
 Sizes = tuple[float | None, float | None, float | None]

@@ -238,14 +238,7 @@ def _pedal_bin(random: np.random.Generator, r: float, tall_m: float, skin: Mater
 
 def _paper_basket(random: np.random.Generator, r: float, tall_m: float, skin: Material) -> list[Part]:
     mesh = Material(skin.color, str(random.choice(["grille", "plain"])), darker(skin.color, 0.45), 0.03)
-    shell = [
-        (0, 0),
-        (r * 0.75, 0),
-        (r, tall_m),
-        (r * 0.96, tall_m),
-        (r * 0.73, tall_m * 0.06),
-        (0, tall_m * 0.06),
-    ]
+    shell = [(0, 0), (r * 0.75, 0), (r, tall_m), (r * 0.96, tall_m), (r * 0.73, tall_m * 0.06), (0, tall_m * 0.06)]
     rim = turned(hoop((0, 0, 0), r, tall_m * 0.018, Material((30, 29, 30))), np.pi / 2, "x")
     parts = [lathe(shell, mesh), moved(rim, (0, 0, tall_m))]
     paper = Material((232, 230, 224), "noise", (200, 198, 190), 0.04)

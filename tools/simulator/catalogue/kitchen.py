@@ -13,13 +13,7 @@ from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL, 
 from placegraph.tools.simulator.catalogue.bathroom import washbasin
 from placegraph.tools.simulator.color_palette import COLORS, METALS, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
-from placegraph.tools.simulator.mesh_primitives import (
-    Point,
-    block,
-    box,
-    cylinder,
-    moved,
-)
+from placegraph.tools.simulator.mesh_primitives import Point, block, box, cylinder, moved
 
 DISPLAY = Material((96, 220, 190), glow=0.8)
 ENAMELS = (*("white",) * 6, *("gray",) * 4, "black", "black", "red", "beige", "blue", "green")

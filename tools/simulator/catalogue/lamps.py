@@ -11,16 +11,7 @@ from placegraph.tools.simulator.catalogue._item_assembly import fitted, sizes
 from placegraph.tools.simulator.catalogue._materials import Length, Random
 from placegraph.tools.simulator.color_palette import METALS, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import (
-    Point,
-    block,
-    cylinder,
-    ellipsoid,
-    lathe,
-    moved,
-    tube,
-    turned,
-)
+from placegraph.tools.simulator.mesh_primitives import Point, block, cylinder, ellipsoid, lathe, moved, tube, turned
 
 BULB = Material((255, 244, 214), glow=1.0)
 SHADES = ("white", "white", "beige", "beige", "yellow", "orange", "red", "green", "blue", "gray", "pink")

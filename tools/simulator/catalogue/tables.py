@@ -7,15 +7,7 @@ import itertools
 import numpy as np
 from numpy.random import Generator
 
-from placegraph.tools.simulator.catalogue._cabinet_parts import (
-    case,
-    dark_of,
-    finish,
-    fronts_of,
-    metal,
-    standing,
-    wood,
-)
+from placegraph.tools.simulator.catalogue._cabinet_parts import case, dark_of, finish, fronts_of, metal, standing, wood
 from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
 from placegraph.tools.simulator.mesh_primitives import block, box, extrude, lathe, moved, tube
