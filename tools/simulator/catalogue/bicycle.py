@@ -135,9 +135,8 @@ def bicycle(random: Random, wanted: WantedSize) -> Item:
     low = min(float(part.vertices[:, 2].min()) for part in parts)
     parts = [moved(part, (0, 0, -low)) for part in parts]
     width = drawn(random, wanted.width_m, 1.6, 1.82)
-    return fitted(
-        "bicycle", parts, (width, wanted.depth_m, wanted.height_m or width * float(random.uniform(0.58, 0.63))), name
-    )
+    height = wanted.height_m or width * float(random.uniform(0.58, 0.63))
+    return fitted("bicycle", parts, (width, wanted.depth_m, height), name)
 
 
 DESIGNS = {"bicycle": bicycle}

@@ -65,9 +65,8 @@ def radiator(random: Random, wanted: WantedSize) -> Item:
     """A panel with ribs and a grille, a row of columns, or a ladder of bars; with a valve at its side."""
     kind = int(random.choice([0, 0, 1, 1, 2]))
     tall = kind == 2 and wanted.height_m is None and wanted.width_m is None
-    width, depth, height = wanted.fill(
-        random, (0.45, 0.6) if tall else (0.7, 1.3), (0.09, 0.14), (0.9, 1.3) if tall else (0.5, 0.65)
-    )
+    wide, high = ((0.45, 0.6), (0.9, 1.3)) if tall else ((0.7, 1.3), (0.5, 0.65))
+    width, depth, height = wanted.fill(random, wide, (0.09, 0.14), high)
     names = ("white", "white", "white", "gray", "black", "beige")
     name, color = pick(random, names) if kind else pick(random, ("white", "white", "beige"))
     paint = Material(color, gloss=0.3)

@@ -94,12 +94,8 @@ def _leather(random: Random, width_m: float, depth_m: float, height_m: float) ->
 def suitcase(random: Random, wanted: WantedSize) -> Item:
     """An upright trolley case, or an old suitcase of leather on its long side."""
     trolley = chance(random, 0.6)
-    width, depth, height = wanted.fill(
-        random,
-        (0.36, 0.48) if trolley else (0.55, 0.75),
-        (0.22, 0.3) if trolley else (0.16, 0.22),
-        (0.62, 0.95) if trolley else (0.42, 0.52),
-    )
+    ranges = ((0.36, 0.48), (0.22, 0.3), (0.62, 0.95)) if trolley else ((0.55, 0.75), (0.16, 0.22), (0.42, 0.52))
+    width, depth, height = wanted.fill(random, *ranges)
     name, parts = (_trolley if trolley else _leather)(random, width, depth, height)
     return fitted("suitcase", parts, (width, depth, height), name)
 

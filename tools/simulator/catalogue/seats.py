@@ -216,12 +216,8 @@ def bench(random: Random, wanted: WantedSize) -> Item:
     style = str(random.choice(["plain", "back", "padded"]))
     if wanted.height_m is not None:
         style = "back" if wanted.height_m > 0.62 else ("plain" if style == "back" else style)
-    w, d, h = wanted.fill(
-        random,
-        (0.95, 1.5),
-        (0.42, 0.5) if style == "back" else (0.32, 0.4),
-        (0.8, 0.92) if style == "back" else (0.42, 0.48),
-    )
+    deep, high = ((0.42, 0.5), (0.8, 0.92)) if style == "back" else ((0.32, 0.4), (0.42, 0.48))
+    w, d, h = wanted.fill(random, (0.95, 1.5), deep, high)
     name, frame = wood(random)
     seat = 0.45 if style == "back" else h
     if style == "padded":

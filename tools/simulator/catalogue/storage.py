@@ -74,9 +74,7 @@ def _books(random: Random, x0: float, x1: float, y: float, d: float, z: float, g
 def bookshelf(random: Random, wanted: WantedSize) -> Item:
     """Boards between sides, partly filled with books: a case with a back, cubes, or an open frame of metal posts."""
     style = str(random.choice(["case", "cubes", "open"]))
-    w, d, h = wanted.fill(
-        random, (0.6, 1.15), (0.25, 0.36), (0.9 if style == "cubes" else 1.3, 1.5 if style == "cubes" else 2.05)
-    )
+    w, d, h = wanted.fill(random, (0.6, 1.15), (0.25, 0.36), (0.9, 1.5) if style == "cubes" else (1.3, 2.05))
     name, board = finish(random, 0.15)
     t = float(random.uniform(0.02, 0.03))
     side = t if style != "open" else 0.025
@@ -215,9 +213,8 @@ def _coat(random: Random, x: float, y: float, top: float, length: float, half: t
 def coat_rack(random: Random, wanted: WantedSize) -> Item:
     """A pole with pegs on crossed feet, or a rail on two posts; both with coats, the pole at times with a hat."""
     pole = random.random() < 0.6 if wanted.width_m is None else wanted.width_m < 0.7
-    w, d, h = wanted.fill(
-        random, (0.42, 0.6) if pole else (0.8, 1.2), (0.42, 0.55), (1.65, 1.85) if pole else (1.4, 1.65)
-    )
+    wide, high = ((0.42, 0.6), (1.65, 1.85)) if pole else ((0.8, 1.2), (1.4, 1.65))
+    w, d, h = wanted.fill(random, wide, (0.42, 0.55), high)
     name, stuff = wood(random)
     if not pole:
         bar = metal(random)
