@@ -11,13 +11,7 @@ import pytest
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.language.language_model import LanguageModel, Reply
 from placegraph.runtime.messages import Answer, Frame, Graph, Keyframe, Pose
-from placegraph.tools.recorded_steps import (
-    Reference,
-    _json_differences,
-    differences,
-    language_model_replies,
-    summary,
-)
+from placegraph.tools.recorded_steps import Reference, _json_differences, differences, language_model_replies, summary
 
 
 def frame(frame_id: int) -> Frame:

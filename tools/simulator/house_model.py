@@ -147,6 +147,12 @@ class Room:
     type: str
     polygon: F64
 
+    @property
+    def area_m2(self) -> float:
+        """The area of the polygon."""
+        x, y = self.polygon.T
+        return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
+
 
 @dataclass(frozen=True, eq=False)
 class Staircase:

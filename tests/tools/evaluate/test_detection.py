@@ -1,13 +1,7 @@
 import numpy as np
 import pytest
 
-from placegraph.tools.evaluate.detection import (
-    FoundBoxes,
-    TrueBoxes,
-    average_precisions,
-    mean_of_known,
-    overlaps,
-)
+from placegraph.tools.evaluate.detection import FoundBoxes, TrueBoxes, average_precisions, mean_of_known, overlaps
 
 A, B, C = [0, 0, 10, 10], [20, 0, 30, 10], [40, 0, 50, 10]
 FAR = [80, 80, 90, 90]

@@ -9,6 +9,7 @@ import numpy as np
 from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.house_model import FurnitureLocation
 from placegraph.tools.simulator.occupancy_grid import points_in_polygon
+from placegraph.tools.simulator.question_generation import WORDS
 from placegraph.tools.simulator.question_generation.box_relations import MAYBE, NO, YES, TernaryArray, single_match
 from placegraph.tools.simulator.question_generation.class_synonyms import ItemMention
 from placegraph.tools.simulator.question_generation.item_table import ItemTable
@@ -20,12 +21,6 @@ HEIGHT_RATIO, HEIGHT_LEAD_M = 1.15, 0.1
 LEVEL_LEAD_M = 0.25
 ROOM_WIDE_LOCATIONS = ("cooking area", "bathing area", "washing area", "laundry area", "sleeping area", "entrance area")
 NEAR_LOCATION_M = 1.2  # items this near to an outline may count as part of the location
-# Colours that are confused by people or under lamp light.
-SIMILAR_COLORS: tuple[tuple[str, ...], ...] = (
-    ("white", "beige", "gray"), ("beige", "light brown", "yellow", "orange"), ("light brown", "brown", "orange"),
-    ("gray", "black"), ("black", "brown"), ("red", "orange", "pink", "brown"), ("orange", "yellow"),
-    ("pink", "purple"), ("blue", "purple"), ("yellow", "white"),
-)  # fmt: skip
 
 
 NO_COLOR = ("window", "mirror")  # only their thin frame has a colour
@@ -54,7 +49,7 @@ def may_be_confused(first: str, second: str) -> bool:
         not first
         or not second
         or first == second
-        or any(first in group and second in group for group in SIMILAR_COLORS)
+        or any(first in group and second in group for group in WORDS["similar_colors"])
     )
 
 

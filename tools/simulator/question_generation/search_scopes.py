@@ -8,17 +8,10 @@ import numpy as np
 
 from placegraph.runtime.arrays import Bool
 from placegraph.tools.simulator.house_model import Room
+from placegraph.tools.simulator.question_generation import WORDS
 from placegraph.tools.simulator.question_generation.class_synonyms import ItemMention
 from placegraph.tools.simulator.question_generation.item_table import ItemTable
 
-ROOM_WORDS: dict[str, tuple[str, ...]] = {
-    "living room": ("living room", "living room", "lounge"),
-    "kitchen": ("kitchen",),
-    "office": ("office", "office", "study"),
-    "laundry": ("laundry room", "laundry"),
-    "hallway": ("hallway", "hall"),
-    "corridor": ("corridor", "hallway"),
-}
 INTERCHANGEABLE_ROOMS = ("hallway", "corridor")  # words that are used for each other
 AREA_RATIO = 1.25  # smallest ratio of areas for "larger"
 
@@ -87,7 +80,7 @@ def _rooms_of_word(table: ItemTable, room: Room) -> list[Room]:
 
 
 def _room_words(table: ItemTable, room: Room) -> tuple[ScopePhrase, ...]:
-    names = ROOM_WORDS.get(room.type, (room.type,))
+    names = WORDS["room_words"].get(room.type, (room.type,))
     may_be_confused = _rooms_of_word(table, room)
     if len(may_be_confused) == 1:
         return tuple(_in_room(name, name) for name in names)
@@ -115,7 +108,7 @@ def _room_words(table: ItemTable, room: Room) -> tuple[ScopePhrase, ...]:
 
 
 def _size_words(room: Room, rooms: list[Room]) -> tuple[str, ...]:
-    area, other_areas = area_m2(room), [area_m2(other) for other in rooms if other.id != room.id]
+    area, other_areas = room.area_m2, [other.area_m2 for other in rooms if other.id != room.id]
     if not other_areas:
         return ()
     if area >= AREA_RATIO * max(other_areas):
@@ -129,12 +122,6 @@ def _size_condition(adjective: str) -> str:
     return {"larger": "largest", "bigger": "largest", "smaller": "smallest", "small": "is small"}.get(
         adjective, adjective
     )
-
-
-def area_m2(room: Room) -> float:
-    """The area of a room's polygon."""
-    x, y = room.polygon.T
-    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
 
 
 def _content_words(table: ItemTable, room: Room, may_be_confused: list[Room], name: str) -> list[ScopePhrase]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from placegraph.tools.simulator.house_model import ON_FLOOR
+from placegraph.tools.simulator.question_generation import WORDS
 from placegraph.tools.simulator.question_generation.asker_positions import (
     MAX_VIEW_M,
     MIN_VIEW_M,
@@ -21,18 +22,6 @@ from placegraph.tools.simulator.question_generation.item_table import ItemTable
 from placegraph.tools.simulator.question_generation.question_spec import QuestionSpec, unique_mentions
 from placegraph.tools.simulator.question_generation.search_scopes import SearchScope
 
-# Classes without a front: front and behind depend on the viewer alone.
-NO_FRONT = (
-    "table",
-    "coffee table",
-    "stool",
-    "potted plant",
-    "vase",
-    "lamp",
-    "coat rack",
-    "trash can",
-    "laundry basket",
-)
 FRONT_DEGREES = 45.0  # from an anchor's front; within it the viewer's and the anchor's front agree
 PHRASES: dict[str, str] = {
     "left": "to the left of the {}", "right": "to the right of the {}",
@@ -106,7 +95,7 @@ def _fits(table: ItemTable, form: str, target: int, anchor: int, peers: np.ndarr
 
 def _faces_front(table: ItemTable, position: AskerPosition, anchor: int) -> bool:
     """Whether the asker stands in front of the anchor's own front, or it has none."""
-    if table.names[anchor] in NO_FRONT:
+    if table.names[anchor] in WORDS["no_front"]:
         return True
     yaw = table.house.items[anchor].yaw
     front = np.array([np.sin(yaw), -np.cos(yaw)])
