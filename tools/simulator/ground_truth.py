@@ -251,13 +251,6 @@ def write_before(before: House, ids: tuple[int, ...], folder: Path) -> None:
     (folder / TRUTH / BEFORE).write_text(text + "\n", encoding="utf-8")
 
 
-def read_before(dir: Path) -> tuple[TrueObject, ...]:
-    """The moved objects as they stood before; () when nothing was moved. Raises SourceError when damaged."""
-    file = dir / TRUTH / BEFORE
-    objects: tuple[TrueObject, ...] = _read(file, "objects") if file.exists() else ()
-    return objects
-
-
 def read_house_run(dir: Path) -> HouseRun | None:
     """The run of a house folder; None when it has no truth/house.json. Raises SourceError when damaged."""
     file = dir / TRUTH / "house.json"

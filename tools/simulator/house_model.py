@@ -137,6 +137,16 @@ class Wall:
     thickness_m: float
     openings: tuple[WallOpening, ...] = ()
 
+    @property
+    def direction(self) -> F64:
+        """(2,) the unit vector from a to b."""
+        way = np.array(self.b) - np.array(self.a)
+        return np.asarray(way / np.linalg.norm(way))
+
+    def middle_of(self, opening: WallOpening) -> F64:
+        """(2,) the middle of an opening, world frame."""
+        return np.asarray(np.array(self.a) + self.direction * (opening.start_m + opening.end_m) / 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Room:

@@ -16,6 +16,7 @@ from placegraph.tools.simulator.mesh_primitives import (
     cylinder,
     ellipsoid,
     extrude,
+    grid_faces,
     lathe,
     moved,
     tube,
@@ -163,8 +164,7 @@ def _sheet(x0: float, x1: float, z0: float, z1: float, y: float, wave: float, ma
     xs = np.linspace(x0, x1, 13)
     ys = y + wave * np.sin(np.arange(13) * 1.7)
     vertices = np.array([(x, e, z) for z in (z0, z1) for x, e in zip(xs, ys, strict=True)])
-    faces = [face for i in range(12) for face in ((i, i + 1, i + 14), (i, i + 14, i + 13))]
-    return Part(vertices, np.array(faces, np.int32), material)
+    return Part(vertices, grid_faces(2, 13), material)
 
 
 def towel(random: Random, wanted: WantedSize) -> Item:

@@ -18,7 +18,7 @@ from placegraph.tools.simulator.catalogue._item_assembly import (
 )
 from placegraph.tools.simulator.color_palette import COLORS, METALS, MUTED, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import block, box, ellipsoid, extrude, tube, turned
+from placegraph.tools.simulator.mesh_primitives import block, box, ellipsoid, extrude, grid_faces, tube, turned
 
 
 def _wood(random: Random) -> tuple[str, Material]:
@@ -174,12 +174,7 @@ def _panel(wide_m: float, tall_m: float, wave_m: float, folds: float, tied: bool
         y = wave_m * np.sin(2 * np.pi * folds * share)
         sheet.append(np.stack((share * wide * wide_m, y, np.full(columns, z * tall_m)), axis=1))
     front = np.concatenate(sheet)
-    faces = []
-    for i in range(len(rows) - 1):
-        for j in range(columns - 1):
-            a, b = i * columns + j, (i + 1) * columns + j
-            faces += [(a, a + 1, b + 1), (a, b + 1, b)]
-    outside = np.array(faces, np.int32)
+    outside = grid_faces(len(rows), columns)
     behind = front + np.array([0, 0.004, 0])
     return Part(np.concatenate((front, behind)), np.concatenate((outside, outside[:, ::-1] + len(front))), cloth)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from placegraph.tools.simulator.catalogue._appliance_parts import knob
 from placegraph.tools.simulator.catalogue._cabinet_parts import finish, metal
 from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled, drawn
 from placegraph.tools.simulator.color_palette import COLORS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import Point, block, box, cylinder, extrude, lathe, moved, turned
+from placegraph.tools.simulator.mesh_primitives import block, box, cylinder, extrude, lathe, quads
 
 _BLACK = Material((24, 24, 27), gloss=0.4)
 _PAPER = Material((244, 243, 238))
@@ -29,11 +30,6 @@ def _picture(random: Random, dark: float) -> Material:
         pick(random, ("white", "blue", "gray"))[1],
     )
     return Material(colors[0], "screen", colors[1], 0.0, int(random.integers(100000)), gloss=0.2, glow=0.75)
-
-
-def _disc(center: Point, radius_m: float, out_m: float, material: Material, sides: int = 20) -> Part:
-    """A round plate around a center on a front, that stands `out_m` out of it toward -y."""
-    return moved(turned(cylinder((0, 0, 0), radius_m, out_m, material, sides=sides), np.pi / 2, "x"), center)
 
 
 def tv(random: Random, wanted: WantedSize) -> Item:
@@ -90,7 +86,7 @@ def monitor(random: Random, wanted: WantedSize) -> Item:
     else:
         parts.append(box((-0.36 * w, -d / 2, 0), (0.36 * w, d / 2, 0.014), foot))
     if style == "chin":
-        parts.append(_disc((0, -0.04, low + chin / 2), 0.018, 0.002, _BLACK, 10))
+        parts.append(knob(0, -0.04, low + chin / 2, 0.018, 0.002, _BLACK, 10))
     return assembled("monitor", parts, (w, d, h), name)
 
 
@@ -115,9 +111,7 @@ def _keys(random: Random, x0: float, x1: float, y0: float, y1: float, z: float, 
 
 def _tops(rectangles: list[tuple[float, float, float, float]], z: float, material: Material) -> Part:
     """Level rectangles (x0, x1, y0, y1) at height z that face up, as one part."""
-    vertices = np.array([p for a, b, c, d in rectangles for p in ((a, c, z), (b, c, z), (b, d, z), (a, d, z))], float)
-    faces = [(4 * k + i, 4 * k + j, 4 * k + m) for k in range(len(rectangles)) for i, j, m in ((0, 1, 2), (0, 2, 3))]
-    return Part(vertices, np.array(faces, np.int32), material)
+    return quads([((a, c, z), (b, c, z), (b, d, z), (a, d, z)) for a, b, c, d in rectangles], material)
 
 
 def keyboard(random: Random, wanted: WantedSize) -> Item:
@@ -182,7 +176,7 @@ def printer(random: Random, wanted: WantedSize) -> Item:
     parts.append(box((-0.24 * w, 0.01 - d / 2, z + 0.008), (0.24 * w, y + 0.06, z + 0.016), _PAPER))
     screen = Material((70, 120, 180), "screen", (200, 220, 240), 0.0, int(random.integers(1000)), glow=0.6)
     parts.append(box((0.1 * w, y - 0.006, lip + 0.25 * band), (0.28 * w, y, lip + 0.8 * band), screen))
-    parts += [_disc((w * a, y, lip + band / 2), 0.009, 0.005, m, 8)
+    parts += [knob(w * a, y, lip + band / 2, 0.009, 0.005, m, 8)
               for a, m in ((0.34, Material((60, 170, 90), glow=0.3)), (0.4, dark))]  # fmt: skip
     if style == "feeder":
         z = top - 0.02
@@ -237,9 +231,9 @@ def speaker(random: Random, wanted: WantedSize) -> Item:
     )
     for z, share in spots:
         r = share * w
-        parts.append(_disc((0, front, z), r, 0.008, rim, 12))
-        parts.append(_disc((0, front, z), 0.86 * r, 0.010, cone, 12))
-        parts.append(_disc((0, front, z), 0.35 * r, 0.012, Material((88, 88, 92)), 8))
+        parts.append(knob(0, front, z, r, 0.008, rim, 12))
+        parts.append(knob(0, front, z, 0.86 * r, 0.010, cone, 12))
+        parts.append(knob(0, front, z, 0.35 * r, 0.012, Material((88, 88, 92)), 8))
     return assembled("speaker", parts, (w, d, h), name)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.tools.simulator.catalogue._cabinet_parts import finish, metal, wood
-from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled, drawn
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled, drawn, loft
 from placegraph.tools.simulator.catalogue._upholstery import cloth, cushion, leaned, legs, upholstered
 from placegraph.tools.simulator.color_palette import darker
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
@@ -116,19 +116,13 @@ def _tub(w: float, d: float, h: float, cover: Material, leg: Material) -> list[P
         top = h - (h - min(0.6, 0.75 * h)) * (1 - max(0.0, float(np.sin(a)))) ** 0.7
         for share, z in ((0.78, foot), (0.86, top), (1.0, top), (0.9, foot)):
             rings.append((share * w / 2 * np.cos(a), share * d / 2 * np.sin(a), z))
-    faces = []
-    for i in range(sides - 1):
-        for k in range(4):
-            a, b = 4 * i + k, 4 * i + (k + 1) % 4
-            faces += [(a, b, b + 4), (a, b + 4, a + 4)]
-    last = 4 * (sides - 1)
-    faces += [(0, 2, 1), (0, 3, 2), (last, last + 1, last + 2), (last, last + 2, last + 3)]
-    shell = np.array(rings)
-    shell[:, 0] *= w / np.ptp(shell[:, 0])
+    points = np.array(rings)
+    points[:, 0] *= w / np.ptp(points[:, 0])
+    shell = loft(points.reshape(sides, 4, 3), cover)
     pad = lathe([(0, foot), (0.82, foot), (0.88, seat - 0.05), (0.8, seat), (0, seat)], cover)
     front = -d / 2 - float(pad.vertices[:, 1].min()) * d / 2
     pad = Part(pad.vertices * (w / 2, d / 2, 1) + (0, front, 0), pad.faces, cover)
-    return [*legs(0.6 * w, 0.6 * d, foot + 0.02, 0.035, leg), Part(shell, np.array(faces, np.int32), cover), pad]
+    return [*legs(0.6 * w, 0.6 * d, foot + 0.02, 0.035, leg), shell, pad]
 
 
 def office_chair(random: Random, wanted: WantedSize) -> Item:

@@ -8,7 +8,7 @@ from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, chance, drawn, fitted, hoop
 from placegraph.tools.simulator.color_palette import COLORS, MUTED, VIVID, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import block, ellipsoid, moved, turned
+from placegraph.tools.simulator.mesh_primitives import block, ellipsoid, grid_faces, moved, turned
 
 _FURS: dict[str, Color] = {"brown": (122, 80, 48), "light brown": (178, 132, 84), "beige": (212, 190, 154),
                            "gray": (140, 138, 136), "white": (228, 222, 212), "pink": (220, 156, 172)}  # fmt: skip
@@ -21,12 +21,7 @@ def _puffed(width_m: float, depth_m: float, height_m: float, material: Material,
     x, y = u * (1 - 0.08 * (1 - v**2)), v * (1 - 0.08 * (1 - u**2))
     bulge = np.sqrt(np.clip((1 - u**4) * (1 - v**4), 0, None)) * height_m / 2
     sheet = np.stack((x * width_m / 2, y * depth_m / 2, bulge), axis=1)
-    faces = []
-    for i in range(count - 1):
-        for j in range(count - 1):
-            a, b = i * count + j, (i + 1) * count + j
-            faces += [(a, a + 1, b + 1), (a, b + 1, b)]
-    upper = np.array(faces, np.int32)
+    upper = grid_faces(count, count)
     vertices = np.concatenate((sheet, sheet * np.array([1, 1, -1])))
     return Part(vertices, np.concatenate((upper, upper[:, ::-1] + len(sheet))), material)
 
