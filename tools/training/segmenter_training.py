@@ -13,7 +13,7 @@ from torch.nn import functional
 from placegraph.tools.training import training_loop as loop
 from placegraph.tools.training.data_augmentation import Augmentation, TrainingSample, batches, load_shards
 from placegraph.tools.training.detector_training import image_batch
-from placegraph.tools.training.networks import MaskDecoder, MaskEncoder
+from placegraph.tools.training.mask_networks import MaskDecoder, MaskEncoder
 
 SIZE = (320, 416)  # height, width in px
 BATCH = 4

@@ -6,12 +6,11 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
+from placegraph.tools.training.mask_networks import MaskDecoder, MaskEncoder  # noqa: E402
 from placegraph.tools.training.networks import (  # noqa: E402
     STRIDES,
     Backbone,
     DetectorExport,
-    MaskDecoder,
-    MaskEncoder,
     ObjectNetwork,
     TaggerNetwork,
     anchors,
