@@ -29,18 +29,16 @@ NO_COLOR = ("window", "mirror")  # only their thin frame has a colour
 def attribute_questions(table: ItemTable, search_scopes: tuple[SearchScope, ...]) -> Iterator[QuestionSpec]:
     """Questions of the forms unique, floor, room, superlative, size and color."""
     for scope in search_scopes:
-        for item_id in np.flatnonzero(table.can_be_target & scope.mask).tolist():
-            for name_group in table.name_groups[item_id]:
-                peers = np.flatnonzero(table.of(name_group.classes) & scope.mask)
-                mention = ItemMention(item_id, name_group)
-                if len(peers) == 1:
-                    is_ambiguous = np.count_nonzero(table.of(name_group.classes)) > 1
-                    form = {"house": "unique", "floor": "floor", "room": "room"}[scope.kind]
-                    if is_ambiguous or scope.kind == "house":
-                        yield QuestionSpec(form, mention, scope)
-                elif table.has_class_peer(item_id, scope.mask):
-                    yield from _by_color(table, scope, mention, peers)
-                    yield from _by_measure(table, scope, mention, peers)
+        for mention in table.mentions(table.can_be_target & scope.mask):
+            peers = np.flatnonzero(table.peers(mention, scope.mask))
+            if len(peers) == 1:
+                is_ambiguous = np.count_nonzero(table.of(mention.name_group.classes)) > 1
+                form = {"house": "unique", "floor": "floor", "room": "room"}[scope.kind]
+                if is_ambiguous or scope.kind == "house":
+                    yield QuestionSpec(form, mention, scope)
+            elif table.has_class_peer(mention.id, scope.mask):
+                yield from _by_color(table, scope, mention, peers)
+                yield from _by_measure(table, scope, mention, peers)
 
 
 def may_be_confused(first: str, second: str) -> bool:
@@ -111,15 +109,11 @@ def location_questions(table: ItemTable, search_scopes: tuple[SearchScope, ...])
         for scope in search_scopes:
             if scope.kind == "room" or not _is_alone(table, scope, place):
                 continue
-            for item_id in np.flatnonzero(table.can_be_target & scope.mask & (answers == YES)).tolist():
-                for name_group in table.name_groups[item_id]:
-                    peers = table.of(name_group.classes) & scope.mask
-                    if single_match(answers, peers) == item_id:
-                        is_ambiguous = table.has_class_peer(item_id, scope.mask)
-                        yield QuestionSpec(
-                            "location", ItemMention(item_id, name_group), scope, phrases=(f"in the {place.kind}",),
-                            conditions=(f"room ({place.kind})",), is_ambiguous=is_ambiguous,
-                        )  # fmt: skip
+            for mention in table.mentions(table.can_be_target & scope.mask & (answers == YES)):
+                if single_match(answers, table.peers(mention, scope.mask)) == mention.id:
+                    is_ambiguous = table.has_class_peer(mention.id, scope.mask)
+                    phrases, conditions = (f"in the {place.kind}",), (f"room ({place.kind})",)
+                    yield QuestionSpec("location", mention, scope, "", phrases, conditions, is_ambiguous=is_ambiguous)
 
 
 def _is_alone(table: ItemTable, scope: SearchScope, place: FurnitureLocation) -> bool:
