@@ -102,6 +102,13 @@ class PlacedItem:
         return np.asarray(local @ pose[:3, :3].T + pose[:3, 3])
 
     @property
+    def oriented_box(self) -> tuple[F64, F64, float]:
+        """Centre (3,), size (3,) along its own axes, and yaw in -pi..pi; metres, world frame."""
+        (low, high), pose = self.item.extent, self.world_from_item
+        center = pose[:3, :3] @ ((low + high) / 2) + pose[:3, 3]
+        return center, high - low, float(np.arctan2(np.sin(self.yaw), np.cos(self.yaw)))
+
+    @property
     def box(self) -> F64:
         """(2, 3) axis-aligned min and max in metres, world frame."""
         vertices = self.vertices_world
