@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from placegraph.runtime.vision.area_overlap import Area, AreaOverlaps, overlaps
 from placegraph.tools.evaluate.aligned_map import AlignedMap, MapPlace
 from placegraph.tools.evaluate.ground_truth import GroundTruth, GroundTruthPlace
 from placegraph.tools.evaluate.object_scores import object_scores
 from placegraph.tools.evaluate.place_overlap import (
     BOUNDARY_M,
-    Area,
-    AreaOverlaps,
+    CELL_M,
     f1_curve,
     hydra_scores,
     match_floors,
     match_scores,
-    overlaps,
     ratio,
 )
 
@@ -85,4 +84,4 @@ def _counts(places: Sequence[MapPlace], true: Sequence[GroundTruthPlace]) -> dic
 
 def _overlaps(places: Sequence[MapPlace], true: Sequence[GroundTruthPlace], true_floors: Sequence[int]) -> AreaOverlaps:
     areas: list[Area] = [(true_floors[place.floor], place.outline) for place in places]
-    return overlaps(areas, [(place.floor, place.outline) for place in true if place.seen])
+    return overlaps(areas, [(place.floor, place.outline) for place in true if place.seen], CELL_M)

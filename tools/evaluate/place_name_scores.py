@@ -9,9 +9,10 @@ import numpy as np
 
 from placegraph.runtime.language.word_forms import normal_form, synonyms
 from placegraph.runtime.scene_graph import SceneGraph
+from placegraph.runtime.vision.area_overlap import Area, AreaOverlaps, overlaps
 from placegraph.tools.evaluate.aligned_map import AlignedMap, MapPlace
 from placegraph.tools.evaluate.layer_scores import UNKNOWN_FLOOR
-from placegraph.tools.evaluate.place_overlap import Area, AreaOverlaps, match_floors, overlaps, ratio
+from placegraph.tools.evaluate.place_overlap import CELL_M, match_floors, ratio
 from placegraph.tools.simulator.ground_truth import Truth
 
 MIN_INSIDE = 0.5  # of a map place that must lie in one true place; otherwise it is of no single kind and not judged
@@ -29,10 +30,10 @@ def place_name_scores(graph: SceneGraph, aligned_map: AlignedMap, truth: Truth) 
     rooms = [(room.floor, room.polygon) for room in truth.rooms]
     locations = [(room_floor[location.room], location.outline) for location in truth.locations]
 
-    def scores(places: Sequence[MapPlace], true: list[Area], kinds: list[str]) -> dict[str, Any]:
+    def scores(places: Sequence[MapPlace], true: Sequence[Area], kinds: list[str]) -> dict[str, Any]:
         areas: list[Area] = [(true_floor_of.get(place.floor, UNKNOWN_FLOOR), place.outline) for place in places]
         names = [[tag.name for tag in graph.nodes[place.id].tags] for place in places]
-        return name_scores(names, overlaps(areas, true), kinds)
+        return name_scores(names, overlaps(areas, true, CELL_M), kinds)
 
     return {
         "rooms": scores(aligned_map.rooms, rooms, [room.type for room in truth.rooms]),

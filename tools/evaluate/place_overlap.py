@@ -7,30 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from placegraph.runtime.arrays import F64, I64, Bool
-from placegraph.tools.simulator.occupancy_grid import points_in_polygon
+from placegraph.runtime.arrays import F64
+from placegraph.runtime.vision.area_overlap import AreaOverlaps
 
 CELL_M = 0.05
 BOUNDARY_M = 0.5  # within which both heights of a floor must lie, as in HOV-SG
 DELTAS = tuple(round(0.1 * k, 1) for k in range(1, 10))
-
-AreaRaster = tuple[I64, Bool]  # see _rasterize
-Area = tuple[int, F64]  # floor and outline (N, 2) in metres; areas of different floors never overlap
-
-
-@dataclass(frozen=True, eq=False)
-class AreaOverlaps:
-    """Of F found and T true areas: what they share (F, T) and what each covers (F,), (T,), in cells."""
-
-    shared: F64
-    found: F64
-    true: F64
-
-    @property
-    def iou(self) -> F64:
-        """(F, T); 0 where both are empty."""
-        union = self.found[:, None] + self.true[None] - self.shared
-        return np.divide(self.shared, union, out=np.zeros_like(self.shared), where=union > 0)
 
 
 @dataclass(frozen=True)
@@ -45,38 +27,6 @@ class MatchScores:
 def ratio(part: float, whole: float) -> float:
     """A part of a whole as a number; NaN when there is no whole."""
     return part / whole if whole else float("nan")
-
-
-def overlaps(found: Sequence[Area], true: Sequence[Area], cell_m: float = CELL_M) -> AreaOverlaps:
-    """Overlaps of areas, counted in cells of a common grid whose middle lies in them."""
-    a, b = ([_rasterize(outline, cell_m) for _, outline in areas] for areas in (found, true))
-    shared = np.zeros((len(found), len(true)))
-    for i, j in np.ndindex(*shared.shape):
-        if found[i][0] == true[j][0]:
-            shared[i, j] = _shared_cells(a[i], b[j])
-    sizes = (np.array([mask.sum() for _, mask in rasters], float) for rasters in (a, b))
-    return AreaOverlaps(shared, *sizes)
-
-
-def _rasterize(outline: F64, cell_m: float) -> AreaRaster:
-    """Number (2,) of the first cell along x and y of an outline's extent, and which cells of it lie inside."""
-    if len(outline) < 3:
-        return np.zeros(2, np.int64), np.zeros((0, 0), bool)
-    low = np.floor(outline.min(axis=0) / cell_m).astype(np.int64)
-    count = np.ceil(outline.max(axis=0) / cell_m).astype(np.int64) - low
-    grid = np.stack(np.meshgrid(np.arange(count[0]), np.arange(count[1]), indexing="ij"), axis=-1)
-    return low, points_in_polygon(outline, (grid + low + 0.5) * cell_m)
-
-
-def _shared_cells(a: AreaRaster, b: AreaRaster) -> int:
-    low = np.maximum(a[0], b[0])
-    high = np.minimum(a[0] + a[1].shape, b[0] + b[1].shape)
-    if (low >= high).any():
-        return 0
-    parts = (
-        mask[tuple(slice(*ends) for ends in zip(low - first, high - first, strict=True))] for first, mask in (a, b)
-    )
-    return int(np.logical_and(*parts).sum())
 
 
 def hydra_scores(overlaps: AreaOverlaps) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from placegraph.tools.simulator.floor_plan_openings import FloorOpenings
 from placegraph.tools.simulator.floor_plan_rooms import Rectangle
 from placegraph.tools.simulator.floor_plan_walls import CellSide, FloorWalls, WallLine
 from placegraph.tools.simulator.house_model import Floor, Material, Part, WallOpening
-from placegraph.tools.simulator.mesh_primitives import box
+from placegraph.tools.simulator.mesh_primitives import box, quads
 from placegraph.tools.simulator.surface_finishes import Finish, building_material, room_finish, trim_material
 
 BEHIND_M = 0.003  # the wall core behind the wall finish, the slab below the floor
@@ -161,14 +161,8 @@ def _floor_cover(shape: FloorShape, room: int, finish: Finish) -> list[Part]:
 
 def _horizontal_mesh(places: list[Rectangle], z_m: float, material: Material, up: bool) -> Part:
     """Level rectangles as one mesh, facing up or down."""
-    quads = [[(p.x0, p.y0, z_m), (p.x1, p.y0, z_m), (p.x1, p.y1, z_m), (p.x0, p.y1, z_m)] for p in places]
-    return _quad_mesh([quad if up else quad[::-1] for quad in quads], material)
-
-
-def _quad_mesh(quads: list[list[tuple[float, float, float]]], material: Material) -> Part:
-    """Quads, counterclockwise from outside, as one part."""
-    faces = [(4 * k + a, 4 * k + b, 4 * k + c) for k in range(len(quads)) for a, b, c in ((0, 1, 2), (0, 2, 3))]
-    return Part(np.array(quads, float).reshape(-1, 3), np.array(faces, np.int32).reshape(-1, 3), material)
+    corners = [[(p.x0, p.y0, z_m), (p.x1, p.y0, z_m), (p.x1, p.y1, z_m), (p.x0, p.y1, z_m)] for p in places]
+    return quads([quad if up else quad[::-1] for quad in corners], material)
 
 
 def _room_sides(shape: FloorShape, room: int) -> list[CellSide]:
@@ -184,15 +178,15 @@ def _wall_linings(shape: FloorShape, room: int, finish: Finish) -> list[Part]:
     z, top = shape.floor.z_m, shape.floor.z_m + shape.floor.height_m
     parts = []
     for material, low, high in ((finish.dado, z, z + finish.dado_m), (finish.wall, z + finish.dado_m, top)):
-        quads = []
+        corners = []
         for side in _room_sides(shape, room) if high > low else []:
             holes = _opening_bands(shape.openings.by_line.get(side.line, []), z)
-            quads += [
+            corners += [
                 _vertical_quad(side, piece)
                 for piece in subtract_rectangles((side.start_m, side.end_m, low, high), holes)
             ]
-        if quads:
-            parts.append(_quad_mesh(quads, material))
+        if corners:
+            parts.append(quads(corners, material))
     return parts
 
 
@@ -243,7 +237,7 @@ def _beams(shape: FloorShape, room: int, finish: Finish) -> list[Part]:
 
 def _thresholds(shape: FloorShape, material: Material) -> list[Part]:
     """The floor within doors and archways."""
-    quads = []
+    places = []
     for index, line in enumerate(shape.grid.lines):
         for hole in shape.openings.by_line.get(index, []):
             if hole.low_m == 0:
@@ -251,8 +245,8 @@ def _thresholds(shape: FloorShape, material: Material) -> list[Part]:
                     line.point(hole.start_m, -line.thickness_m / 2),
                     line.point(hole.end_m, line.thickness_m / 2),
                 )
-                quads.append(Rectangle(min(ax, bx), min(ay, by), max(ax, bx), max(ay, by)))
-    return [_horizontal_mesh(quads, shape.floor.z_m, material, up=True)] if quads else []
+                places.append(Rectangle(min(ax, bx), min(ay, by), max(ax, bx), max(ay, by)))
+    return [_horizontal_mesh(places, shape.floor.z_m, material, up=True)] if places else []
 
 
 def _casings(random: np.random.Generator, shape: FloorShape, material: Material) -> list[Part]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from placegraph.runtime.arrays import F64, I64, Bool
+from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.errors import SourceError
 from placegraph.tools.simulator.camera_motion import camera_poses, smooth_sway
 from placegraph.tools.simulator.house_model import Floor, House, Room, Staircase
@@ -34,7 +34,6 @@ SALT = 4_201  # a random stream of its own
 CELL_M = 0.05
 RADIUS_M = 0.25  # of the robot
 EYE_M = (1.25, 1.4)  # lowest and highest camera above the floor
-NO_ROOM = -1  # of a frame on the stairs
 
 HALF_VIEW = np.radians(
     30.0
@@ -96,30 +95,6 @@ def camera_trajectory(house: House, seed: int, rate_hz: float = 10.0) -> CameraT
         head = above.middles(np.array([landing_cell(house, flight, above, up=True)]))[0]
         _climb_stairs(state, flight, np.append(head, house.floors[floor.index + 1].z_m))
     return _camera_frames(state, random, rate_hz)
-
-
-def items_in_view(house: House, trajectory: CameraTrajectory, half_view: tuple[float, float] = (0.6, 0.47)) -> Bool:
-    """(I,) whether the centre of each item was in view, .5 to 4.5 m ahead; half_view in radians, across and upright."""
-    result = np.zeros(len(house.items), bool)
-    camera_from_world = np.linalg.inv(trajectory.world_from_camera)
-    for k, item in enumerate(house.items):
-        x, y, z = (camera_from_world[:, :3, :3] @ item.box.mean(axis=0) + camera_from_world[:, :3, 3]).T
-        framed = (np.abs(x) < z * np.tan(half_view[0])) & (np.abs(y) < z * np.tan(half_view[1]))
-        result[k] = bool(np.any(framed & (z > 0.5) & (z < 4.5)))
-    return result
-
-
-def rooms_of_frames(house: House, world_from_camera: F64) -> I64:
-    """(N,) Room.id of each camera pose (N, 4, 4), NO_ROOM on stairs; in a doorway the room that is being left."""
-    xyz = world_from_camera[:, :3, 3]
-    rooms = np.full(len(xyz), NO_ROOM, np.int64)
-    for floor in house.floors:
-        level = (xyz[:, 2] > floor.z_m + EYE_M[0] - 0.02) & (xyz[:, 2] < floor.z_m + EYE_M[1] + 0.02)
-        for room in floor.rooms:
-            rooms[level & points_in_polygon(room.polygon, xyz[:, :2])] = room.id
-        for k in np.flatnonzero(level):
-            rooms[k] = rooms[k - 1] if rooms[k] == NO_ROOM and k else rooms[k]
-    return rooms
 
 
 def floor_free_space(house: House, floor: Floor) -> FreeSpace:
@@ -250,9 +225,7 @@ def _start_position(house: House, free_space: FreeSpace) -> F64:
     for wall in floor.walls:
         for opening in wall.openings:
             if opening.kind == "door" and len(opening.rooms) == 1:
-                a, b = np.array(wall.a), np.array(wall.b)
-                middle = a + (b - a) / np.linalg.norm(b - a) * (opening.start_m + opening.end_m) / 2
-                return np.asarray(free_space.middles(np.array([free_space.nearest(middle)]))[0])
+                return np.asarray(free_space.middles(np.array([free_space.nearest(wall.middle_of(opening))]))[0])
     rank = {"hallway": 0, "living room": 1}
     room = min(floor.rooms, key=lambda room_candidate: (rank.get(room_candidate.type, 2), room_candidate.id))
     return np.asarray(free_space.middles(np.array([free_space.nearest(room.polygon.mean(axis=0))]))[0])

@@ -191,12 +191,7 @@ def arrange_rooms(
         cells = _fill_rows(random, shell, extent, names, ended and trial < TRIALS // 2)
         if cells is not None:
             hall = "corridor" if floor else "hallway"
-            end = min(
-                [
-                    shell.width_m,
-                    *(c.place.x0 for c in cells if c.place.y0 < shell.south_m + 0.1 < c.place.y1),
-                ]
-            )
+            end = min([shell.width_m, *(c.place.x0 for c in cells if c.place.y0 < shell.south_m + 0.1 < c.place.y1)])
             place = Rectangle(0.0, shell.south_m, end, shell.south_m + shell.hall_m)
             if all(_has_hall_access(cell, place, shell, floor) for cell in cells):
                 return [RoomCell(hall, place), *cells]

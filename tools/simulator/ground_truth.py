@@ -8,14 +8,14 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SourceError
-from placegraph.tools.simulator.house_model import House, Item, PlacedItem
+from placegraph.tools.simulator.house_model import House, PlacedItem
 from placegraph.tools.simulator.room_connections import room_connections
 
 TRUTH = "truth"  # the folder beside rgb/ and depth/
@@ -163,6 +163,7 @@ class Truth:
     connections: tuple[TrueConnection, ...] | None = None  # None: the folder has no such file
 
 
+Record = TypeVar("Record", TrueRoom, TrueFloor, TrueLocation, TrueConnection)
 _FILES: dict[str, TypeAdapter[Any]] = {
     "house": TypeAdapter(HouseRun),
     "objects": TypeAdapter(tuple[TrueObject, ...]),
@@ -180,31 +181,21 @@ def truth_of(house: House, run: HouseRun, seen: tuple[FrameCounts, ...]) -> Trut
     return Truth(
         house=run,
         objects=tuple(_true_object(item, floor_of_room[item.room]) for item in house.items),
-        rooms=tuple(TrueRoom(room.id, room.floor, room.type, room.polygon) for room in house.rooms),
-        floors=tuple(TrueFloor(floor.index, floor.z_m, floor.height_m, floor.outline) for floor in house.floors),
-        locations=tuple(
-            TrueLocation(place.id, place.kind, place.room, place.members, place.outline) for place in house.locations
-        ),
+        rooms=tuple(_record(TrueRoom, room) for room in house.rooms),
+        floors=tuple(_record(TrueFloor, floor) for floor in house.floors),
+        locations=tuple(_record(TrueLocation, location) for location in house.locations),
         seen=seen,
-        connections=tuple(
-            TrueConnection(
-                connection.id,
-                connection.kind,
-                connection.rooms,
-                connection.ends,
-                connection.width_m,
-                connection.travel_m,
-            )
-            for connection in room_connections(house)
-        ),
+        connections=tuple(_record(TrueConnection, connection) for connection in room_connections(house)),
     )
 
 
+def _record(kind: type[Record], source: object) -> Record:
+    """A record of a kind with the fields of the same names of a house's part."""
+    return kind(**{field.name: getattr(source, field.name) for field in fields(kind)})  # type: ignore[arg-type]
+
+
 def _true_object(placed: PlacedItem, floor: int) -> TrueObject:
-    item: Item = placed.item
-    low, high = item.extent
-    pose = placed.world_from_item
-    center = pose[:3, :3] @ ((low + high) / 2) + pose[:3, 3]
+    item = placed.item
     return TrueObject(
         id=placed.id,
         class_name=item.name,
@@ -214,7 +205,7 @@ def _true_object(placed: PlacedItem, floor: int) -> TrueObject:
         support=placed.support,
         color_name=item.color_name,
         box=placed.box,
-        oriented_box=OrientedBox(center, high - low, float(np.arctan2(np.sin(placed.yaw), np.cos(placed.yaw)))),
+        oriented_box=OrientedBox(*placed.oriented_box),
         footprint=placed.footprint,
     )
 
@@ -225,9 +216,7 @@ def write_truth(truth: Truth, folder: Path) -> None:
     for name, adapter in _FILES.items():
         if getattr(truth, name) is None:
             continue
-        values = _rounded(adapter.dump_python(getattr(truth, name), mode="json", by_alias=True))
-        text = json.dumps(values, sort_keys=True, ensure_ascii=False, allow_nan=False, indent=1)
-        (folder / TRUTH / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        _write(getattr(truth, name), adapter, folder / TRUTH / f"{name}.json")
 
 
 def read_truth(dir: Path) -> Truth:
@@ -246,16 +235,13 @@ def write_before(before: House, ids: tuple[int, ...], folder: Path) -> None:
     """Write truth/before.json: the objects of these ids as they stood before they were moved."""
     floor_of_room = {room.id: room.floor for room in before.rooms}
     objects = tuple(_true_object(before.items[id], floor_of_room[before.items[id].room]) for id in ids)
-    values = _rounded(_FILES["objects"].dump_python(objects, mode="json", by_alias=True))
+    _write(objects, _FILES["objects"], folder / TRUTH / BEFORE)
+
+
+def _write(value: Any, adapter: TypeAdapter[Any], file: Path) -> None:
+    values = _rounded(adapter.dump_python(value, mode="json", by_alias=True))
     text = json.dumps(values, sort_keys=True, ensure_ascii=False, allow_nan=False, indent=1)
-    (folder / TRUTH / BEFORE).write_text(text + "\n", encoding="utf-8")
-
-
-def read_before(dir: Path) -> tuple[TrueObject, ...]:
-    """The moved objects as they stood before; () when nothing was moved. Raises SourceError when damaged."""
-    file = dir / TRUTH / BEFORE
-    objects: tuple[TrueObject, ...] = _read(file, "objects") if file.exists() else ()
-    return objects
+    file.write_text(text + "\n", encoding="utf-8")
 
 
 def read_house_run(dir: Path) -> HouseRun | None:

@@ -42,10 +42,7 @@ def _node(id: str, parent: str, name: str, box: F64, outline: F64) -> Node:
 
 def _object(placed: PlacedItem) -> Node:
     item = placed.item
-    low, high = item.extent
-    pose = placed.world_from_item
-    center = pose[:3, :3] @ ((low + high) / 2) + pose[:3, 3]
-    yaw = float(np.arctan2(np.sin(placed.yaw), np.cos(placed.yaw)))
+    center, size, yaw = placed.oriented_box
     return Node(
         id=f"O{placed.id}",
         parent=f"R{placed.room}" if placed.location == NOWHERE else f"L{placed.location}",
@@ -54,6 +51,6 @@ def _object(placed: PlacedItem) -> Node:
         footprint=placed.footprint,
         first_frame=-1,
         last_frame=-1,
-        oriented_box=(*center.tolist(), *(high - low).tolist(), yaw),
+        oriented_box=(*center.tolist(), *size.tolist(), yaw),
         color=(WOODS | COLORS).get(item.color_name, ()) if item.color_name else (),
     )

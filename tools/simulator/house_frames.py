@@ -112,6 +112,7 @@ def quantize_depth(depth_m: F32) -> F32:
 def generator_version() -> str:
     """A checksum of the simulator's sources: equal seeds give equal bytes while it is unchanged."""
     folder, digest = Path(__file__).parent, hashlib.sha256()
-    for file in sorted(folder.rglob("*.py"), key=lambda file: file.relative_to(folder).as_posix()):
+    files = (file for file in folder.rglob("*.*") if file.suffix in (".py", ".toml"))
+    for file in sorted(files, key=lambda file: file.relative_to(folder).as_posix()):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()[:12]

@@ -102,6 +102,13 @@ class PlacedItem:
         return np.asarray(local @ pose[:3, :3].T + pose[:3, 3])
 
     @property
+    def oriented_box(self) -> tuple[F64, F64, float]:
+        """Centre (3,), size (3,) along its own axes, and yaw in -pi..pi; metres, world frame."""
+        (low, high), pose = self.item.extent, self.world_from_item
+        center = pose[:3, :3] @ ((low + high) / 2) + pose[:3, 3]
+        return center, high - low, float(np.arctan2(np.sin(self.yaw), np.cos(self.yaw)))
+
+    @property
     def box(self) -> F64:
         """(2, 3) axis-aligned min and max in metres, world frame."""
         vertices = self.vertices_world
@@ -137,6 +144,16 @@ class Wall:
     thickness_m: float
     openings: tuple[WallOpening, ...] = ()
 
+    @property
+    def direction(self) -> F64:
+        """(2,) the unit vector from a to b."""
+        way = np.array(self.b) - np.array(self.a)
+        return np.asarray(way / np.linalg.norm(way))
+
+    def middle_of(self, opening: WallOpening) -> F64:
+        """(2,) the middle of an opening, world frame."""
+        return np.asarray(np.array(self.a) + self.direction * (opening.start_m + opening.end_m) / 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Room:
@@ -146,6 +163,12 @@ class Room:
     floor: int
     type: str
     polygon: F64
+
+    @property
+    def area_m2(self) -> float:
+        """The area of the polygon."""
+        x, y = self.polygon.T
+        return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,8 +42,8 @@ def bake_light(house: House, scene: EmbreeScene, corners: F64) -> F64:
     group, count = _corner_groups(world, normals)
     point, normal = (_mean(values.reshape(-1, 3), group, count) for values in (world + inward, normals))
     point += 0.006 * normal  # the corner itself may touch another surface, hence also the pull inward
-    items_in_view = _ray_lengths_m(scene, point, normal, _COVER_M) < 0.999 * _COVER_M
-    point += (items_in_view * (_COVER_M + 0.01))[:, None] * normal
+    covered = _ray_lengths_m(scene, point, normal, _COVER_M) < 0.999 * _COVER_M
+    point += (covered * (_COVER_M + 0.01))[:, None] * normal
     light = _ambient_light(scene, point, normal) + _lamp_light(scene, point, normal, nearest_lamps(house, point))
     return np.asarray(light[group].reshape(world.shape[:2]))
 

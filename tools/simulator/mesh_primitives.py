@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from placegraph.runtime.arrays import I32
 from placegraph.tools.simulator.house_model import Material, Part
 
 Point = tuple[float, float, float]
@@ -98,6 +99,19 @@ def tube(points: Sequence[Point], radius_m: float, material: Material, sides: in
     return Part(np.concatenate(rings), np.array(faces, np.int32), material)
 
 
+def quads(corners: Sequence[Sequence[Point]], material: Material) -> Part:
+    """Quads, each counterclockwise from outside, as one part."""
+    faces = [(4 * k + a, 4 * k + b, 4 * k + c) for k in range(len(corners)) for a, b, c in ((0, 1, 2), (0, 2, 3))]
+    return Part(np.array(corners, float).reshape(-1, 3), np.array(faces, np.int32).reshape(-1, 3), material)
+
+
+def grid_faces(rows: int, columns: int) -> I32:
+    """Faces of a grid of vertices, row by row, that face the viewer when columns run right and rows run up."""
+    starts = [i * columns + j for i in range(rows - 1) for j in range(columns - 1)]
+    triangles = [((a, a + 1, a + columns + 1), (a, a + columns + 1, a + columns)) for a in starts]
+    return np.array(triangles, np.int32).reshape(-1, 3)
+
+
 def extrude(outline: Sequence[tuple[float, float]], z0: float, z1: float, material: Material) -> Part:
     """An upright prism over a *convex* outline given counterclockwise."""
     n = len(outline)
@@ -119,8 +133,3 @@ def turned(part: Part, angle: float, axis: str = "z", about: Point = (0, 0, 0)) 
 def moved(part: Part, by: Point) -> Part:
     """A part moved by a vector."""
     return Part(part.vertices + np.array(by), part.faces, part.material)
-
-
-def mirrored_x(part: Part) -> Part:
-    """A part mirrored left to right; its faces stay outward."""
-    return Part(part.vertices * np.array([-1.0, 1, 1]), part.faces[:, ::-1].copy(), part.material)

@@ -58,8 +58,7 @@ def unfurnished_grid(house: House, floor_index: int, cell_m: float) -> tuple[F64
 
 def opening_rectangle(wall: Wall, opening: WallOpening, beyond_m: float = 0.0, inset_m: float = 0.0) -> F64:
     """The (4, 2) ground corners of an opening: through the wall and `beyond_m` out on both sides, counterclockwise."""
-    a, b = np.array(wall.a), np.array(wall.b)
-    along = (b - a) / np.linalg.norm(b - a)
+    a, along = np.array(wall.a), wall.direction
     across = np.array([-along[1], along[0]]) * (wall.thickness_m / 2 + beyond_m)
     start, end = a + along * (opening.start_m + inset_m), a + along * (opening.end_m - inset_m)
     return np.stack([start - across, end - across, end + across, start + across])

@@ -279,11 +279,7 @@ def _passage_middles(floor: Floor, room: Room) -> F64:
     """(K, 2) middles of the doors and archways of a room; of the room itself when there are none."""
     middles = []
     for wall in floor.walls:
-        a, b = np.array(wall.a), np.array(wall.b)
-        along = (b - a) / np.linalg.norm(b - a)
-        middles += [
-            a + along * (opening.start_m + opening.end_m) / 2 for opening in wall.openings if room.id in opening.rooms
-        ]
+        middles += [wall.middle_of(opening) for opening in wall.openings if room.id in opening.rooms]
     return np.array(middles or [room.polygon.mean(axis=0)])
 
 

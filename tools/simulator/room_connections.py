@@ -56,10 +56,9 @@ _Passage = tuple[str, tuple[int, int], F64, float]
 def _openings(floor: Floor) -> list[_Passage]:
     passages: list[_Passage] = []
     for wall in floor.walls:
-        a, b = np.array(wall.a), np.array(wall.b)
         for opening in wall.openings:
             if opening.kind in PASSAGE_KINDS and len(opening.rooms) == 2:
-                middle = a + (b - a) / np.linalg.norm(b - a) * (opening.start_m + opening.end_m) / 2
+                middle = wall.middle_of(opening)
                 ends = np.stack([np.array([*middle, floor.z_m])] * 2)
                 passages.append(
                     (opening.kind, (opening.rooms[0], opening.rooms[1]), ends, opening.end_m - opening.start_m)

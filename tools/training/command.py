@@ -58,7 +58,7 @@ def refine(
     """Train the objects further on larger images; with --from-package also on views of your own."""
     from placegraph.models_onnx.manifest import find_weights
     from placegraph.tools.training.batch_norm_folding import fold_batch_norm, packaged_start
-    from placegraph.tools.training.detector_training import refine_objects
+    from placegraph.tools.training.detector_training import train_objects
     from placegraph.tools.training.networks import ObjectNetwork
     from placegraph.tools.training.training_loop import read_average
 
@@ -68,7 +68,7 @@ def refine(
         )
     else:
         start = fold_batch_norm(read_average(work / "objects.pt", ObjectNetwork()))
-    refine_objects(start, data, work / "refined.pt", steps, threads=threads)
+    train_objects(data, work / "refined.pt", steps, start, seed=2, threads=threads)
 
 
 @app.command()

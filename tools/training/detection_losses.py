@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from placegraph.tools.simulator.object_classes import NAMES
 from placegraph.tools.training.data_augmentation import TrainingSample
 from placegraph.tools.training.networks import anchors
 
@@ -39,17 +40,55 @@ class DetectionTargets:
 
 def detection_targets(samples: Sequence[TrainingSample], prompts: int) -> DetectionTargets:
     """Targets of a batch for `prompts` words; word i is that of class i while there are classes."""
-    tags = np.zeros((len(samples), prompts), np.float32)
-    for k, sample in enumerate(samples):
-        tags[k, sample.classes[~sample.counts]] = np.nan
-        tags[k, sample.classes[sample.counts]] = 1
     return DetectionTargets(
         [torch.from_numpy(s.boxes) for s in samples],
         [torch.from_numpy(s.classes) for s in samples],
         [torch.from_numpy(s.counts) for s in samples],
         torch.from_numpy(np.stack([s.cells for s in samples])),
-        torch.from_numpy(tags),
+        tag_targets(samples, prompts),
     )
+
+
+def tag_targets(samples: Sequence[TrainingSample], count: int = len(NAMES)) -> Tensor:
+    """(B, count): 1 shown, 0 not, nan where the only visible object of the class is too small or cut off."""
+    tags = np.zeros((len(samples), count), np.float32)
+    for k, sample in enumerate(samples):
+        tags[k, sample.classes[~sample.counts]] = np.nan
+        tags[k, sample.classes[sample.counts]] = 1
+    return torch.from_numpy(tags)
+
+
+class AnchorLosses:
+    """Box and class losses of a batch by task-aligned assignment, accumulated image by image."""
+
+    def __init__(self, distances: Tensor, logits: Tensor, height: int, width: int) -> None:
+        """distances: (B, 4, A) raw; logits: (B, N, A) of N words."""
+        self.centres, strides = anchors(height, width)
+        reach = functional.softplus(distances) * strides
+        self.boxes = torch.cat((self.centres.T - reach[:, :2], self.centres.T + reach[:, 2:]), 1).transpose(1, 2)
+        self.logits, self.scores = logits, torch.sigmoid(logits.detach())
+        self.target_scores, self.weight = torch.zeros_like(self.scores), torch.ones_like(self.scores)
+        self.box_loss, self.total = torch.zeros(()), torch.zeros(())
+
+    def add(self, k: int, boxes: Tensor, prompts: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Adds image k with boxes (M, 4) of prompts (M,); returns assigned anchors, their boxes and quality (K,)."""
+        if not len(boxes):
+            return prompts, prompts, torch.zeros(0)
+        owner, quality = assign_anchors(self.boxes[k].detach(), self.scores[k], boxes, prompts, self.centres)
+        assigned = torch.nonzero(owner >= 0)[:, 0]
+        owner, quality = owner[assigned], quality[assigned]
+        self.target_scores[k, prompts[owner], assigned] = quality
+        self.weight[k, prompts[owner], assigned] = 1.0
+        self.box_loss = self.box_loss + ((1 - ciou(self.boxes[k, assigned], boxes[owner])) * quality).sum()
+        self.total = self.total + quality.sum()
+        return assigned, owner, quality
+
+    def sums(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Summed box and class loss, and the quality of all assigned anchors to divide them by."""
+        class_loss = functional.binary_cross_entropy_with_logits(
+            self.logits, self.target_scores, self.weight, reduction="sum"
+        )
+        return self.box_loss, class_loss, torch.clamp(self.total, min=1.0)
 
 
 def losses(
@@ -57,37 +96,16 @@ def losses(
 ) -> dict[str, Tensor]:
     """Weighted losses by name, each a mean per sample."""
     distances, logits, dense = (part.float() for part in outputs)
-    centres, strides = anchors(height, width)
-    reach = functional.softplus(distances) * strides
-    predicted_boxes = torch.cat((centres.T - reach[:, :2], centres.T + reach[:, 2:]), 1).transpose(1, 2)  # (B, A, 4)
-    scores = torch.sigmoid(logits.detach())  # (B, N, A)
-    target_scores = torch.zeros_like(scores)
-    weight = torch.ones_like(scores)
-    box_loss = torch.zeros(())
-    total = torch.zeros(())
-    for k in range(len(predicted_boxes)):
-        boxes, prompts, counts = targets.boxes[k], targets.prompts[k], targets.counts[k]
-        _ignore_anchors(weight[k], boxes[~counts], prompts[~counts], centres)
-        boxes, prompts = boxes[counts], prompts[counts]
-        if not len(boxes):
-            continue
-        owner, quality = assign_anchors(predicted_boxes[k].detach(), scores[k], boxes, prompts, centres)
-        assigned = torch.nonzero(owner >= 0)[:, 0]
-        if not len(assigned):
-            continue
-        target_scores[k, prompts[owner[assigned]], assigned] = quality[assigned]
-        weight[k, prompts[owner[assigned]], assigned] = 1.0
-        box_loss = (
-            box_loss + ((1 - ciou(predicted_boxes[k, assigned], boxes[owner[assigned]])) * quality[assigned]).sum()
-        )
-        total = total + quality[assigned].sum()
-    total = torch.clamp(total, min=1.0)
-    class_loss = functional.binary_cross_entropy_with_logits(logits, target_scores, weight, reduction="sum")
+    anchor_losses = AnchorLosses(distances, logits, height, width)
+    for k, (boxes, prompts, counts) in enumerate(zip(targets.boxes, targets.prompts, targets.counts, strict=True)):
+        _ignore_anchors(anchor_losses.weight[k], boxes[~counts], prompts[~counts], anchor_losses.centres)
+        anchor_losses.add(k, boxes[counts], prompts[counts])
+    box, word, total = anchor_losses.sums()
     return {
-        "box": BOX_WEIGHT * box_loss / total,
-        "class": CLASS_WEIGHT * class_loss / total,
+        "box": BOX_WEIGHT * box / total,
+        "class": CLASS_WEIGHT * word / total,
         "dense": DENSE_WEIGHT * _dense_loss(dense, targets.cells),
-        "tag": TAG_WEIGHT * _tag_loss(dense, targets.tags),
+        "tag": TAG_WEIGHT * tag_loss(torch.logsumexp(dense, dim=2), targets.tags),
     }
 
 
@@ -136,10 +154,10 @@ def _dense_loss(dense: Tensor, cells: Tensor) -> Tensor:
     return (loss * miss**1.5).sum() / max(len(image), 1)
 
 
-def _tag_loss(dense: Tensor, tags: Tensor) -> Tensor:
-    pooled = torch.logsumexp(dense, dim=2)
+def tag_loss(logits: Tensor, tags: Tensor) -> Tensor:
+    """Cross entropy of the tags (B, N) that are known, a mean per sample."""
     known = ~torch.isnan(tags)
-    loss = functional.binary_cross_entropy_with_logits(pooled, torch.nan_to_num(tags), reduction="none")
+    loss = functional.binary_cross_entropy_with_logits(logits, torch.nan_to_num(tags), reduction="none")
     return (loss * known).sum() / len(tags)
 
 

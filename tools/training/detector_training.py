@@ -56,36 +56,22 @@ def image_batch(samples: list[TrainingSample]) -> Tensor:
     return torch.from_numpy(stacked).permute(0, 3, 1, 2).float().div_(255)
 
 
-def train_objects(data: Path, checkpoint: Path, steps: int, seed: int = 1, threads: int = 2) -> ObjectNetwork:
-    """Trains from scratch on the shards of `data`, resuming from `checkpoint`; returns the averaged network."""
-    torch.manual_seed(seed)
-    return _fit(ObjectNetwork(), data, checkpoint, steps, FIRST_SIZES, FIRST_RATE, seed, threads)
-
-
-def refine_objects(
-    start: ObjectNetwork, data: Path, checkpoint: Path, steps: int, seed: int = 2, threads: int = 2
-) -> ObjectNetwork:
-    """Trains a folded network further on larger images, resuming from `checkpoint`; returns the averaged network."""
-    torch.manual_seed(seed)
-    return _fit(start, data, checkpoint, steps, SIZES, RATE, seed, threads)
-
-
 def read_refined(checkpoint: Path) -> ObjectNetwork:
-    """The averaged network that refine_objects left in `checkpoint`."""
+    """The averaged network that refining left in `checkpoint`."""
     return loop.read_average(checkpoint, fold_batch_norm(ObjectNetwork()))
 
 
-def _fit(
-    network: ObjectNetwork,
-    data: Path,
-    checkpoint: Path,
-    steps: int,
-    sizes: tuple[tuple[int, int], tuple[int, int]],
-    rate: float,
-    seed: int,
-    threads: int,
+def train_objects(
+    data: Path, checkpoint: Path, steps: int, start: ObjectNetwork | None = None, seed: int = 1, threads: int = 2
 ) -> ObjectNetwork:
+    """Trains on the shards of `data`, resuming from `checkpoint`; returns the averaged network.
+
+    start: a folded network that is refined on larger images; None trains from scratch.
+    """
+    torch.manual_seed(seed)
     torch.set_num_threads(threads)
+    network = (start or ObjectNetwork()).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    sizes, rate = (SIZES, RATE) if start else (FIRST_SIZES, FIRST_RATE)
     shards = load_shards(data)
     prompts = Prompts(seed)
     augments = [Augmentation(shards, *size, seed + sum(size), common=COMMON, with_depth=False) for size in sizes]
@@ -99,4 +85,4 @@ def _fit(
             outputs = network(image_batch(samples), text.expand(len(samples), -1, -1))
         return losses(outputs, detection_targets(samples, len(text)), *sizes[large])
 
-    return loop.fit(network.to(memory_format=torch.channels_last), step, steps=steps, rate=rate, checkpoint=checkpoint)
+    return loop.fit(network, step, steps=steps, rate=rate, checkpoint=checkpoint)

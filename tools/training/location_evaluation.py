@@ -16,7 +16,8 @@ from placegraph.models_onnx import LocationDetector
 from placegraph.nodes.hierarchy.floors import FloorSpan
 from placegraph.nodes.hierarchy.locations import LocationConfig, find_locations
 from placegraph.runtime.arrays import F64, Bool
-from placegraph.tools.evaluate.place_overlap import match_scores, overlaps
+from placegraph.runtime.vision.area_overlap import overlaps
+from placegraph.tools.evaluate.place_overlap import CELL_M, match_scores
 from placegraph.tools.simulator.house_frames import generate_house
 from placegraph.tools.training.room_scans import RoomScan, add_mapping_errors, scan_rooms
 
@@ -63,7 +64,7 @@ def house_iou(rooms: Sequence[MappedRoom], find: LocationFinder) -> F64:
     """IoU (F, T) of all predicted with all true locations of a house; 0 across rooms."""
     predicted = [(number, outline) for number, room in enumerate(rooms) for outline in find(room.scan)]
     true = [(number, outline) for number, room in enumerate(rooms) for outline in room.scan.outlines]
-    return overlaps(predicted, true).iou
+    return overlaps(predicted, true, CELL_M).iou
 
 
 def comparison(

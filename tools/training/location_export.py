@@ -31,7 +31,7 @@ def export_locations(checkpoint: Path, data: Path, folder: Path) -> tuple[Path, 
     trained = read_average(checkpoint, LocationNetwork())
     assert isinstance(trained, LocationNetwork)
     float_file = export_onnx(
-        LocationExport(trained, SIZE_PX),
+        LocationExport(trained, SIZE_PX, SIZE_PX),
         {"images": torch.rand(1, 3, SIZE_PX, SIZE_PX)},
         ["output0", "output1"],
         folder / "float" / f"{NAME}.onnx",

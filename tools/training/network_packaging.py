@@ -16,13 +16,14 @@ from placegraph.runtime.errors import ConfigError
 from placegraph.tools.simulator.object_classes import NAMES
 from placegraph.tools.training.batch_norm_folding import fold_batch_norm
 from placegraph.tools.training.data_augmentation import Augmentation, TrainingSample, load_shards
+from placegraph.tools.training.detection_losses import tag_targets
 from placegraph.tools.training.detector_training import SIZES, read_refined
-from placegraph.tools.training.networks import DetectorExport, MaskEncoder, ObjectNetwork, TaggerNetwork
+from placegraph.tools.training.mask_networks import MaskEncoder
+from placegraph.tools.training.networks import DetectorExport, ObjectNetwork, TaggerNetwork
 from placegraph.tools.training.onnx_export import Feeds, export_onnx, image_feed, quantise
 from placegraph.tools.training.segmenter_training import SIZE as MASK_SIZE
 from placegraph.tools.training.segmenter_training import MaskNetwork
 from placegraph.tools.training.tagger_training import SIZE as TAG_SIZE
-from placegraph.tools.training.tagger_training import tag_targets
 from placegraph.tools.training.training_loop import read_average
 
 CALIBRATION_VIEWS = 160

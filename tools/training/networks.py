@@ -6,6 +6,8 @@ pixels as in YOLO-World's contrastive head: a projected word vector times the em
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -78,29 +80,36 @@ class Backbone(nn.Module):
 
     WIDTHS = (64, 80, 112)
 
-    def __init__(self) -> None:
+    def __init__(self, c16: int = 112, c32: int = 176, depths: tuple[int, int, int] = (4, 3, 2)) -> None:
+        """c16, c32: channels at strides 16 and 32; depths: of the blocks there, and of the two paths."""
         super().__init__()
+        depth16, depth32, depth = depths
         self.stem = nn.Sequential(Conv(3, 16, 3, 2), Conv(16, 32, 3, 2), Csp(32, 32, 1))
         self.to8 = nn.Sequential(Conv(32, 64, 3, 2), Csp(64, 64, 2))
-        self.to16 = nn.Sequential(Conv(64, 112, 3, 2), Csp(112, 112, 4))
-        self.to32 = nn.Sequential(Conv(112, 176, 3, 2), Csp(176, 176, 3), PooledPyramid(176))
-        self.down16 = Csp(176 + 112, 80, 2)
-        self.down8 = Csp(80 + 64, 64, 2)
+        self.to16 = nn.Sequential(Conv(64, c16, 3, 2), Csp(c16, c16, depth16))
+        self.to32 = nn.Sequential(Conv(c16, c32, 3, 2), Csp(c32, c32, depth32), PooledPyramid(c32))
+        self.down16 = Csp(c32 + c16, 80, depth)
+        self.down8 = Csp(80 + 64, 64, depth)
         self.up16 = Conv(64, 64, 3, 2)
-        self.join16 = Csp(64 + 80, 80, 2)
+        self.join16 = Csp(64 + 80, 80, depth)
         self.up32 = Conv(80, 80, 3, 2)
-        self.join32 = Csp(80 + 176, 112, 2)
+        self.join32 = Csp(80 + c32, self.WIDTHS[2], depth)
 
-    def forward(self, image: Tensor) -> list[Tensor]:
+    def forward(self, image: Tensor) -> Any:
         """Features at each of STRIDES."""
-        c8 = self.to8(self.stem(image))
+        return self.features(image)[1]
+
+    def features(self, image: Tensor) -> tuple[Tensor, list[Tensor]]:
+        """Features of the stem at stride 4, and those at each of STRIDES."""
+        c4 = self.stem(image)
+        c8 = self.to8(c4)
         c16 = self.to16(c8)
         c32 = self.to32(c16)
-        p16 = self.down16(torch.cat((_upsample(c32), c16), 1))
-        p8 = self.down8(torch.cat((_upsample(p16), c8), 1))
+        p16 = self.down16(torch.cat((upsample(c32), c16), 1))
+        p8 = self.down8(torch.cat((upsample(p16), c8), 1))
         n16 = self.join16(torch.cat((self.up16(p8), p16), 1))
         n32 = self.join32(torch.cat((self.up32(n16), c32), 1))
-        return [p8, n16, n32]
+        return c4, [p8, n16, n32]
 
 
 class TextHead(nn.Module):
@@ -146,22 +155,30 @@ class ObjectNetwork(nn.Module):
         return distances, logits, self.dense(features[0], words)
 
 
-class DetectorExport(nn.Module):
-    """ObjectNetwork in the YOLO-World export layout, for one input size."""
+class BoxExport(nn.Module):
+    """A network with its boxes decoded to px, for one input size."""
 
-    def __init__(self, network: ObjectNetwork, height: int, width: int) -> None:
+    def __init__(self, network: nn.Module, height: int, width: int) -> None:
         super().__init__()
         self.network = network
         centres, strides = anchors(height, width)
         self.register_buffer("centres", centres.T.contiguous()[None])
         self.register_buffer("strides", strides[None, None])
 
+    def decode(self, distances: Tensor) -> Tensor:
+        """Raw distances (1, 4, A) to boxes (1, 4, A): cx cy w h in px."""
+        reach = functional.softplus(distances) * self.strides
+        low, high = self.centres - reach[:, :2], self.centres + reach[:, 2:]
+        return torch.cat(((low + high) / 2, high - low), dim=1)
+
+
+class DetectorExport(BoxExport):
+    """ObjectNetwork in the YOLO-World export layout, for one input size."""
+
     def forward(self, image: Tensor, text: Tensor) -> Tensor:
         """(1, 3, H, W) and (1, N, 256) to (1, 4 + N, A): cx cy w h in px, and probabilities."""
         distances, logits, _ = self.network(image, text)
-        reach = functional.softplus(distances) * self.strides
-        low, high = self.centres - reach[:, :2], self.centres + reach[:, 2:]
-        return torch.cat(((low + high) / 2, high - low, torch.sigmoid(logits)), dim=1)
+        return torch.cat((self.decode(distances), torch.sigmoid(logits)), dim=1)
 
 
 class TaggerNetwork(nn.Module):
@@ -190,88 +207,6 @@ class TaggerNetwork(nn.Module):
         return self.gains[0] * torch.logsumexp(cells, 2) + self.gains[1] * torch.logsumexp(anchors, 2) + self.shift
 
 
-class MaskEncoder(nn.Module):
-    """Image and depth to an embedding that is shared by all boxes of a frame."""
-
-    CHANNELS = 40
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.to2 = nn.Sequential(Conv(5, 16, 3, 2), Conv(16, 16))
-        self.to4 = nn.Sequential(Conv(16, 32, 3, 2), Csp(32, 32, 1))
-        self.to8 = nn.Sequential(Conv(32, 64, 3, 2), Csp(64, 64, 1))
-        self.to16 = nn.Sequential(Conv(64, 96, 3, 2), Csp(96, 96, 1), PooledPyramid(96))
-        self.down8 = Csp(96 + 64, 48, 1)
-        self.down4 = Csp(48 + 32, 32, 1)
-        self.down2 = Conv(32 + 16, self.CHANNELS - 1, 1)
-
-    def forward(self, image: Tensor, depth: Tensor) -> Tensor:
-        """(B, 3, H, W) 0..1 and (B, 1, H, W) metres, 0 = none: (B, CHANNELS, H/2, W/2); the last channel is depth."""
-        known = (depth > 0).to(depth.dtype)
-        c2 = self.to2(torch.cat((image, depth * 0.2, known), 1))
-        c4 = self.to4(c2)
-        c8 = self.to8(c4)
-        p8 = self.down8(torch.cat((_upsample(self.to16(c8)), c8), 1))
-        p4 = self.down4(torch.cat((_upsample(p8), c4), 1))
-        p2 = self.down2(torch.cat((_upsample(p4), c2), 1))
-        return torch.cat((p2, functional.max_pool2d(depth, 2)), 1)
-
-
-class MaskDecoder(nn.Module):
-    """Embedding and boxes to one mask per box, on a grid that covers the box with a margin, and its predicted IoU."""
-
-    GRID = 48
-    MARGIN = 0.08  # share of the box's size added on each side as context
-
-    def __init__(self) -> None:
-        super().__init__()
-        c = MaskEncoder.CHANNELS + 4
-        self.enter = Conv(c, 32)
-        self.down = nn.Sequential(Conv(32, 48, 3, 2), Csp(48, 48, 1))
-        self.deep = nn.Sequential(Conv(48, 64, 3, 2), Csp(64, 64, 2))
-        self.up1 = Csp(64 + 48, 48, 1)
-        self.up2 = Conv(48 + 32, 24)
-        self.mask = nn.Conv2d(24, 1, 1)
-        self.quality = nn.Linear(64, 1)
-        line = (torch.arange(self.GRID) + 0.5) / self.GRID * (1 + 2 * self.MARGIN) - self.MARGIN
-        self.register_buffer("line", line)
-
-    def forward(self, embedding: Tensor, boxes: Tensor) -> tuple[Tensor, Tensor]:
-        """Embedding (1, C, h, w) and boxes (N, 4) x0 y0 x1 y1 as shares 0..1 of the image to masks and their IoU."""
-        return self.decode(self.sample(embedding, boxes))
-
-    def decode(self, cells: Tensor) -> tuple[Tensor, Tensor]:
-        """Sampled grids (N, C + 4, G, G) of any images to logits (N, 1, G, G) and predicted IoU (N, 1)."""
-        e0 = self.enter(cells)
-        e1 = self.down(e0)
-        e2 = self.deep(e1)
-        d1 = self.up1(torch.cat((_upsample(e2), e1), 1))
-        d0 = self.up2(torch.cat((_upsample(d1), e0), 1))
-        return self.mask(d0), torch.sigmoid(self.quality(e2.mean(dim=(2, 3))))
-
-    def sample(self, embedding: Tensor, boxes: Tensor) -> Tensor:
-        """The embedding at each box's grid, with depth made relative and the box drawn in."""
-        x = boxes[:, 0:1] + (boxes[:, 2:3] - boxes[:, 0:1]) * self.line  # (N, G)
-        y = boxes[:, 1:2] + (boxes[:, 3:4] - boxes[:, 1:2]) * self.line
-        g = self.GRID
-        grid = torch.stack((x[:, None, :].expand(-1, g, g), y[:, :, None].expand(-1, g, g)), -1) * 2 - 1
-        sampled = functional.grid_sample(
-            embedding, grid.reshape(1, -1, g, 2), mode="bilinear", padding_mode="zeros", align_corners=False
-        )
-        sampled = sampled[0].reshape(embedding.shape[1], -1, g, g).transpose(0, 1)  # (N, C, G, G)
-        depth = sampled[:, -1:]
-        q = g // 4
-        middle = depth[:, :, q : g - q, q : g - q]
-        seen = (middle > 0).to(depth.dtype)
-        centre = (middle * seen).sum(dim=(2, 3), keepdim=True) / (seen.sum(dim=(2, 3), keepdim=True) + 1e-3)
-        relative = torch.clamp(depth - centre, -2.0, 2.0)
-        inside = ((self.line >= 0) & (self.line <= 1)).to(depth.dtype)
-        coarse_mask = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
-        # the size of the box gives the resolution of the grid
-        size = (boxes[:, 2:] - boxes[:, :2])[:, :, None, None].expand(-1, 2, g, g)
-        return torch.cat((sampled[:, :-1], relative, relative * 4.0, coarse_mask, size), 1)
-
-
 def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
     """Cell centres (A, 2) x y in px and strides (A,) of an input size, by stride, row, column."""
     centres, strides = [], []
@@ -282,5 +217,6 @@ def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
     return torch.cat(centres), torch.cat(strides)
 
 
-def _upsample(x: Tensor) -> Tensor:
+def upsample(x: Tensor) -> Tensor:
+    """(B, C, H, W) to (B, C, 2 H, 2 W) by repetition."""
     return functional.interpolate(x, scale_factor=2.0, mode="nearest")

@@ -13,7 +13,7 @@ from torch.nn import functional
 from placegraph.tools.training import training_loop as loop
 from placegraph.tools.training.data_augmentation import Augmentation, TrainingSample, batches, load_shards
 from placegraph.tools.training.detector_training import image_batch
-from placegraph.tools.training.networks import MaskDecoder, MaskEncoder
+from placegraph.tools.training.mask_networks import MaskDecoder, MaskEncoder
 
 SIZE = (320, 416)  # height, width in px
 BATCH = 4
@@ -80,11 +80,7 @@ def mask_losses(logits: Tensor, quality: Tensor, masks: Tensor, inside: Tensor) 
     with torch.no_grad():
         hit, true = (logits > 0) * inside, masks * inside
         true_iou = (hit * true).sum((1, 2, 3)) / ((hit + true) > 0).sum((1, 2, 3)).clamp(min=1)
-    return {
-        "entropy": entropy,
-        "dice": dice.mean(),
-        "quality": functional.l1_loss(quality[:, 0], true_iou) * 0.2,
-    }
+    return {"entropy": entropy, "dice": dice.mean(), "quality": functional.l1_loss(quality[:, 0], true_iou) * 0.2}
 
 
 def train_masks(data: Path, checkpoint: Path, steps: int, seed: int = 2, threads: int = 2) -> MaskNetwork:

@@ -5,30 +5,20 @@ from __future__ import annotations
 import copy
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
-from torch.nn import functional
 
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.tools.simulator.object_classes import NAMES
 from placegraph.tools.training import training_loop as loop
-from placegraph.tools.training.data_augmentation import Augmentation, TrainingSample, batches, load_shards
+from placegraph.tools.training.data_augmentation import Augmentation, batches, load_shards
+from placegraph.tools.training.detection_losses import tag_loss, tag_targets
 from placegraph.tools.training.detector_training import COMMON, image_batch
 from placegraph.tools.training.networks import ObjectNetwork, TaggerNetwork
 
 SIZE = 448  # px, square: images are squashed, as RAM++ does
 BATCH = 16
 RATE = 3e-4
-
-
-def tag_targets(samples: list[TrainingSample]) -> Tensor:
-    """(B, T): 1 shown, 0 not, nan where the only visible object of the class is too small or cut off."""
-    tags = np.zeros((len(samples), len(NAMES)), np.float32)
-    for k, sample in enumerate(samples):
-        tags[k, sample.classes[~sample.counts]] = np.nan
-        tags[k, sample.classes[sample.counts]] = 1
-    return torch.from_numpy(tags)
 
 
 def train_tagger(
@@ -48,9 +38,6 @@ def train_tagger(
         normal = (image_batch(samples) - network.mean) / network.std
         with torch.autocast("cpu", dtype=torch.bfloat16):
             logits = network(normal).float()
-        targets = tag_targets(samples)
-        known = ~torch.isnan(targets)
-        loss = functional.binary_cross_entropy_with_logits(logits, torch.nan_to_num(targets), reduction="none")
-        return {"tag": (loss * known).sum() / len(samples)}
+        return {"tag": tag_loss(logits, tag_targets(samples))}
 
     return loop.fit(network, step, steps=steps, rate=RATE, checkpoint=checkpoint)

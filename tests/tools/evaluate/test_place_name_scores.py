@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.vision import area_overlap
 from placegraph.tools.evaluate.aligned_map import EMPTY_MAP, AlignedMap, MapPlace
 from placegraph.tools.evaluate.place_name_scores import name_scores, place_name_scores
-from placegraph.tools.evaluate.place_overlap import overlaps
+from placegraph.tools.evaluate.place_overlap import CELL_M
 from placegraph.tools.simulator.ground_truth import FrameCounts, HouseRun, truth_of
 from placegraph.tools.simulator.house_frames import generate_house
+
+
+def overlaps(found, true):
+    return area_overlap.overlaps(found, true, CELL_M)
 
 
 def square(x, side=1.0):

@@ -7,15 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from placegraph.runtime.arrays import F64, I64, Bool
 from placegraph.runtime.errors import SourceError
-from placegraph.tools.simulator.camera_trajectory import (
-    EYE_M,
-    NO_ROOM,
-    CameraTrajectory,
-    camera_trajectory,
-    items_in_view,
-    rooms_of_frames,
-)
+from placegraph.tools.simulator.camera_trajectory import EYE_M, CameraTrajectory, camera_trajectory
 from placegraph.tools.simulator.house_model import (
     Floor,
     House,
@@ -32,6 +26,33 @@ from placegraph.tools.simulator.occupancy_grid import free_grid, points_in_polyg
 from placegraph.tools.simulator.robot_navigation import build_free_space, resample, route, routes_to
 
 WHITE = Material((230, 230, 230))
+
+
+NO_ROOM = -1
+
+
+def items_in_view(house: House, trajectory: CameraTrajectory, half_view: tuple[float, float] = (0.6, 0.47)) -> Bool:
+    """(I,) whether the centre of each item was in view, .5 to 4.5 m ahead; half_view in radians, across and upright."""
+    result = np.zeros(len(house.items), bool)
+    camera_from_world = np.linalg.inv(trajectory.world_from_camera)
+    for k, item in enumerate(house.items):
+        x, y, z = (camera_from_world[:, :3, :3] @ item.box.mean(axis=0) + camera_from_world[:, :3, 3]).T
+        framed = (np.abs(x) < z * np.tan(half_view[0])) & (np.abs(y) < z * np.tan(half_view[1]))
+        result[k] = bool(np.any(framed & (z > 0.5) & (z < 4.5)))
+    return result
+
+
+def rooms_of_frames(house: House, world_from_camera: F64) -> I64:
+    """(N,) Room.id of each camera pose (N, 4, 4), NO_ROOM on stairs; in a doorway the room that is being left."""
+    xyz = world_from_camera[:, :3, 3]
+    rooms = np.full(len(xyz), NO_ROOM, np.int64)
+    for floor in house.floors:
+        level = (xyz[:, 2] > floor.z_m + EYE_M[0] - 0.02) & (xyz[:, 2] < floor.z_m + EYE_M[1] + 0.02)
+        for room in floor.rooms:
+            rooms[level & points_in_polygon(room.polygon, xyz[:, :2])] = room.id
+        for k in np.flatnonzero(level):
+            rooms[k] = rooms[k - 1] if rooms[k] == NO_ROOM and k else rooms[k]
+    return rooms
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:

@@ -247,7 +247,7 @@ def test_the_structure_is_light_and_every_room_is_lit(seed: int, floors: int | N
 def test_the_floor_is_seen_below_every_spot_of_a_room_and_not_in_the_hole() -> None:
     house = _house(20, 2)
     floor, stairs = house.floors[1], house.stairs[0]
-    for polygon, items_in_view in [(room.polygon, True) for room in floor.rooms] + [(stairs.hole, False)]:
+    for polygon, covered in [(room.polygon, True) for room in floor.rooms] + [(stairs.hole, False)]:
         spots = polygon.mean(axis=0) + (polygon - polygon.mean(axis=0)) * 0.3
         spots = spots[points_in_polygon(polygon, spots)]
         hit = np.zeros(len(spots), bool)
@@ -255,7 +255,7 @@ def test_the_floor_is_seen_below_every_spot_of_a_room_and_not_in_the_hole() -> N
             for triangle in part.vertices[part.faces]:
                 if np.ptp(triangle[:, 2]) < 1e-9 and abs(triangle[0, 2] - floor.z_m) < 0.005:
                     hit |= points_in_polygon(triangle[:, :2], spots)
-        assert (hit == items_in_view).all()
+        assert (hit == covered).all()
 
 
 def test_a_wall_less_its_holes_is_all_of_the_rest() -> None:

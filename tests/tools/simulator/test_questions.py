@@ -26,7 +26,7 @@ from placegraph.tools.simulator.house_model import (
 )
 from placegraph.tools.simulator.mesh_primitives import block
 from placegraph.tools.simulator.object_classes import CLASSES
-from placegraph.tools.simulator.question_generation.class_synonyms import NEVER_SAID
+from placegraph.tools.simulator.question_generation import WORDS
 from placegraph.tools.simulator.question_generation.item_table import item_table
 from placegraph.tools.simulator.question_generation.question_spec import QuestionSpec
 from placegraph.tools.simulator.question_generation.search_scopes import floor_words
@@ -268,7 +268,9 @@ def test_questions_name_what_they_say(seed: int) -> None:
         assert np.array_equal(one.box, placed.box) and one.box.shape == (2, 3)
         for named in (one.target, *one.anchors):
             assert any(word in one.text.lower() for word in words[house.items[named].item.name]), one.text
-        assert one.target not in one.anchors and not any(word in one.text for word in NEVER_SAID if " " in word)
+        assert one.target not in one.anchors and not any(
+            word in one.text for word in WORDS["never_used"] if " " in word
+        )
         assert (one.viewpoint is not None) == (one.form in ("left", "right", "front", "behind", "ordinal"))
 
 

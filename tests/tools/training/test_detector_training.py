@@ -12,14 +12,7 @@ from placegraph.tools.simulator.object_classes import CLASSES  # noqa: E402
 from placegraph.tools.training import detector_training  # noqa: E402
 from placegraph.tools.training.batch_norm_folding import fold_batch_norm  # noqa: E402
 from placegraph.tools.training.data_augmentation import TrainingSample  # noqa: E402
-from placegraph.tools.training.detector_training import (  # noqa: E402
-    OTHERS,
-    Prompts,
-    image_batch,
-    read_refined,
-    refine_objects,
-    train_objects,
-)
+from placegraph.tools.training.detector_training import OTHERS, Prompts, image_batch, read_refined, train_objects  # noqa: E402
 from placegraph.tools.training.networks import ObjectNetwork  # noqa: E402
 from placegraph.tools.training.view_rendering import visible_boxes  # noqa: E402
 from placegraph.tools.training.word_projection import OTHER_WORDS  # noqa: E402
@@ -151,7 +144,7 @@ def test_refining_goes_on_without_batch_norm(tmp_path, monkeypatch):
     monkeypatch.setattr(detector_training, "BATCH", 2)
     start = fold_batch_norm(ObjectNetwork())
     before = start.backbone.stem[0][0].weight.detach().clone()
-    found = refine_objects(start, tmp_path / "data", tmp_path / "refined.pt", steps=3, threads=1)
+    found = train_objects(tmp_path / "data", tmp_path / "refined.pt", 3, start, seed=2, threads=1)
     assert not any(isinstance(module, torch.nn.BatchNorm2d) for module in found.modules())
     assert not torch.equal(found.backbone.stem[0][0].weight, before)
     image, text = torch.rand(1, 3, 64, 64), torch.rand(1, 3, 256)

@@ -78,7 +78,7 @@ def test_the_export_is_read_by_the_family_and_gives_what_the_network_gives(tmp_p
     network = LocationNetwork().eval()
     for head in network.heads:
         torch.nn.init.constant_(head[-1].bias[4:5], 1.0)  # so that something is found
-    exported = LocationExport(network, SIZE_PX)
+    exported = LocationExport(network, SIZE_PX, SIZE_PX)
     file = export_onnx(
         exported, {"images": torch.rand(1, 3, SIZE_PX, SIZE_PX)}, ["output0", "output1"], tmp_path / "m.onnx"
     )

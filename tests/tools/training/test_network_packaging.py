@@ -22,8 +22,9 @@ from placegraph.runtime.errors import ConfigError  # noqa: E402
 from placegraph.tools.simulator.object_classes import NAMES  # noqa: E402
 from placegraph.tools.training import network_packaging as pack_module  # noqa: E402
 from placegraph.tools.training.batch_norm_folding import fold_batch_norm  # noqa: E402
+from placegraph.tools.training.mask_networks import MaskDecoder, MaskEncoder  # noqa: E402
 from placegraph.tools.training.network_packaging import KEEP_FLOAT, package_networks  # noqa: E402
-from placegraph.tools.training.networks import MaskDecoder, MaskEncoder, ObjectNetwork, TaggerNetwork  # noqa: E402
+from placegraph.tools.training.networks import ObjectNetwork, TaggerNetwork  # noqa: E402
 from placegraph.tools.training.segmenter_training import MaskNetwork  # noqa: E402
 from placegraph.tools.training.view_rendering import visible_boxes  # noqa: E402
 

@@ -6,16 +6,8 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
-from placegraph.tools.training.networks import (  # noqa: E402
-    STRIDES,
-    Backbone,
-    DetectorExport,
-    MaskDecoder,
-    MaskEncoder,
-    ObjectNetwork,
-    TaggerNetwork,
-    anchors,
-)
+from placegraph.tools.training.mask_networks import MaskDecoder, MaskEncoder  # noqa: E402
+from placegraph.tools.training.networks import STRIDES, Backbone, DetectorExport, ObjectNetwork, TaggerNetwork, anchors  # noqa: E402
 
 torch.set_num_threads(1)
 G, MARGIN = MaskDecoder.GRID, MaskDecoder.MARGIN

@@ -9,7 +9,7 @@ torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
 from placegraph.tools.training import segmenter_training  # noqa: E402
 from placegraph.tools.training.data_augmentation import TrainingSample  # noqa: E402
-from placegraph.tools.training.networks import MaskDecoder, MaskEncoder  # noqa: E402
+from placegraph.tools.training.mask_networks import MaskDecoder, MaskEncoder  # noqa: E402
 from placegraph.tools.training.segmenter_training import MaskNetwork, draw_box_prompts, mask_losses, train_masks  # noqa: E402
 from placegraph.tools.training.view_rendering import visible_boxes  # noqa: E402
 

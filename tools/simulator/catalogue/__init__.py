@@ -1,30 +1,16 @@
-"""Designs of every class: `design(name, random)` assembles one item, never twice the same."""
+"""Designs of every class: `design(name, random)` assembles one item, never the same twice."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from typing import Protocol
-
-import numpy as np
 
 from placegraph.runtime.errors import ConfigError
 from placegraph.runtime.node import available, plugin
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize
 from placegraph.tools.simulator.house_model import Item
 
-
-class Design(Protocol):
-    """Assembles one item of a class; sizes that are given in metres are honoured, the others drawn."""
-
-    def __call__(
-        self,
-        random: np.random.Generator,
-        *,
-        width_m: float | None = None,
-        depth_m: float | None = None,
-        height_m: float | None = None,
-    ) -> Item:
-        """The item, in its own frame."""
-        ...
+Design = Callable[[Random, WantedSize], Item]
 
 
 @cache
@@ -36,16 +22,9 @@ def designs() -> dict[str, Design]:
     return designs_by_name
 
 
-def design(
-    name: str,
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
-    """One new item of a class; raises ConfigError for a class that has no design."""
+def design(name: str, random: Random, **sizes_m: float | None) -> Item:
+    """One new item of a class in the wanted sizes width_m, depth_m, height_m; raises ConfigError without a design."""
     known = designs()
     if name not in known:
         raise ConfigError(f"no design for {name!r}; there are: {', '.join(sorted(known))}")
-    return known[name](random, width_m=width_m, depth_m=depth_m, height_m=height_m)
+    return known[name](random, WantedSize(**sizes_m))

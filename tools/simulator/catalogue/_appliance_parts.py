@@ -7,18 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue._materials import DARK, STEEL, Random
+from placegraph.tools.simulator.catalogue._item_assembly import Random
+from placegraph.tools.simulator.catalogue._materials import DARK, STEEL
 from placegraph.tools.simulator.color_palette import WOODS, darker, pick
 from placegraph.tools.simulator.house_model import Material, Part
-from placegraph.tools.simulator.mesh_primitives import (
-    block,
-    box,
-    cylinder,
-    lathe,
-    moved,
-    tube,
-    turned,
-)
+from placegraph.tools.simulator.mesh_primitives import block, box, cylinder, lathe, moved, tube, turned
 
 
 def molded(

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.random import Generator
 
+from placegraph.tools.simulator.catalogue._item_assembly import Random
 from placegraph.tools.simulator.color_palette import METALS, WOODS, darker, pick
 from placegraph.tools.simulator.house_model import Material, Part
 from placegraph.tools.simulator.mesh_primitives import box, cylinder, moved, turned
@@ -21,13 +21,13 @@ _PANEL_M = 0.016  # thickness of a front
 _DARK = Material((28, 26, 26))
 
 
-def wood(random: Generator, names: Sequence[str] = tuple(WOODS)) -> tuple[str, Material]:
+def wood(random: Random, names: Sequence[str] = tuple(WOODS)) -> tuple[str, Material]:
     """A wood of one of the named colours: its word and material."""
     name, color = pick(random, names, WOODS)
     return name, Material(color, "wood", darker(color, 0.82), 0.4, int(random.integers(1000)), gloss=0.15)
 
 
-def finish(random: Generator, painted: float = 0.25) -> tuple[str, Material]:
+def finish(random: Random, painted: float = 0.25) -> tuple[str, Material]:
     """A wood, or (with probability `painted`) a coat of paint: its word and material."""
     if random.random() >= painted:
         return wood(random)
@@ -35,7 +35,7 @@ def finish(random: Generator, painted: float = 0.25) -> tuple[str, Material]:
     return name, Material(color, gloss=0.25)
 
 
-def metal(random: Generator) -> Material:
+def metal(random: Random) -> Material:
     """A metal for legs, rails and handles."""
     return Material(pick(random, tuple(METALS), METALS)[1], gloss=0.5)
 
@@ -88,7 +88,7 @@ class Fronts:
         return moved(turned(knob, np.pi / 2, "x"), (x, y, z))
 
 
-def fronts_of(random: Generator, body: Material) -> Fronts:
+def fronts_of(random: Random, body: Material) -> Fronts:
     """Fronts that go with a body: mostly its own material, else white, wood or a colour."""
     panel = body if random.random() < 0.7 else finish(random, 0.5)[1]
     pull, kind = metal(random), str(random.choice(["knob", "bar", "groove"]))
@@ -109,7 +109,7 @@ def case(w: float, d: float, z0: float, z1: float, y: float, body: Material) -> 
     ]
 
 
-def standing(random: Generator, w: float, d: float, h: float, body: Material) -> tuple[list[Part], float]:
+def standing(random: Random, w: float, d: float, h: float, body: Material) -> tuple[list[Part], float]:
     """What a case stands on, a plinth or four legs: the parts and the height above them in metres."""
     if random.random() < 0.5:
         high = min(0.07, 0.12 * h)

@@ -3,22 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from placegraph.runtime.arrays import F64
-from placegraph.tools.simulator.catalogue._materials import Random, Size
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
-from placegraph.tools.simulator.mesh_primitives import (
-    Point,
-    extrude,
-    lathe,
-    moved,
-    turned,
-)
+from placegraph.tools.simulator.mesh_primitives import Point, extrude, lathe, moved, turned
 
 Outline = Sequence[tuple[float, float]]
+Random = np.random.Generator
 Sizes = tuple[float | None, float | None, float | None]
+
+
+class WantedSize(NamedTuple):
+    """The sizes in metres that an item must have along x, y and z; the design chooses those that are None."""
+
+    width_m: float | None = None
+    depth_m: float | None = None
+    height_m: float | None = None
+
+    def fill(
+        self, random: Random, *ranges: tuple[float, float], always_draw: bool = False
+    ) -> tuple[float, float, float]:
+        """Width, depth and height; missing ones are drawn from their ranges.
+
+        always_draw: wanted sizes are drawn, too, so that they do not change the random numbers that follow.
+        """
+        filled = []
+        for size_m, (low, high) in zip(self, ranges, strict=True):
+            draw = random.uniform(low, high) if always_draw or size_m is None else size_m
+            filled.append(float(draw if size_m is None else size_m))
+        width, depth, height = filled
+        return width, depth, height
 
 
 def fitted(
@@ -39,12 +56,12 @@ def fitted(
     return Item(name, tuple(fit), color_name, tuple(tops))
 
 
-def drawn(random: np.random.Generator, size_m: float | None, low: float, high: float) -> float:
+def drawn(random: Random, size_m: float | None, low: float, high: float) -> float:
     """The size that is given, in metres, or else one from a range."""
     return float(random.uniform(low, high)) if size_m is None else size_m
 
 
-def chance(random: np.random.Generator, share: float) -> bool:
+def chance(random: Random, share: float) -> bool:
     """True in a share of all draws."""
     return bool(random.random() < share)
 
@@ -132,10 +149,3 @@ def assembled(
     for material, group in groups.items():  # a stretched texture (scale 0) must stay one per part
         joined += group if material.scale_m == 0 else [merged(group)]
     return fitted(name, joined, sizes, color_name, surfaces)
-
-
-def sizes(random: Random, asked: Sequence[float | None], *ranges: tuple[float, float]) -> Size:
-    """Width, depth and height in metres: those given, the others drawn each from its range."""
-    drawn = [float(random.uniform(low, high)) for low, high in ranges]  # always drawn: a given size shifts no other
-    w, d, h = (draw if size is None else float(size) for draw, size in zip(drawn, asked, strict=True))
-    return w, d, h

@@ -6,16 +6,15 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.random import Generator
 
 from placegraph.tools.simulator.catalogue._cabinet_parts import metal, wood
-from placegraph.tools.simulator.catalogue._item_assembly import loft
+from placegraph.tools.simulator.catalogue._item_assembly import Random, loft
 from placegraph.tools.simulator.color_palette import MUTED, VIVID, darker, pick
 from placegraph.tools.simulator.house_model import Material, Part
 from placegraph.tools.simulator.mesh_primitives import Point, box, cylinder, moved, turned
 
 
-def cloth(random: Generator, names: Sequence[str] = MUTED + VIVID) -> tuple[str, Material]:
+def cloth(random: Random, names: Sequence[str] = MUTED + VIVID) -> tuple[str, Material]:
     """A cover for cushions, fabric or leather, at times striped or checked: its word and material."""
     name, color = pick(random, names)
     kind = float(random.random())
@@ -67,7 +66,7 @@ def _sheared(part: Part, x_m: float, y_m: float, high: float) -> Part:
     return Part(part.vertices + share * np.array([[x_m, y_m, 0.0]]), part.faces, part.material)
 
 
-def upholstered(random: Generator, w: float, d: float, h: float, seats: int, cover: Material) -> list[Part]:
+def upholstered(random: Random, w: float, d: float, h: float, seats: int, cover: Material) -> list[Part]:
     """A soft seat for some people: base, arms, back and loose cushions, exactly w by d by h."""
     arm_kind = str(random.choice(["block", "roll", "slim"]))
     arm = {"block": 0.18, "roll": 0.2, "slim": 0.1}[arm_kind] * min(1.0, w / 0.8)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
 from placegraph.tools.simulator.catalogue._appliance_parts import fronts, knob, molded, tap
-from placegraph.tools.simulator.catalogue._item_assembly import fitted, plate_xz, sizes
-from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL, Length, Random
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, fitted, plate_xz
+from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL
 from placegraph.tools.simulator.color_palette import COLORS, METALS, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
 from placegraph.tools.simulator.mesh_primitives import (
@@ -17,6 +16,7 @@ from placegraph.tools.simulator.mesh_primitives import (
     cylinder,
     ellipsoid,
     extrude,
+    grid_faces,
     lathe,
     moved,
     tube,
@@ -48,9 +48,9 @@ def washbasin(random: Random, w: float, d: float, h: float) -> Item:
     return fitted("sink", parts, (w, d, h), word)
 
 
-def toilet(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def toilet(random: Random, wanted: WantedSize) -> Item:
     """A bowl with a seat, its lid up or down, before a cistern or a wall panel with a flush plate."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.36, 0.42), (0.62, 0.72), (0.74, 0.84))
+    w, d, h = wanted.fill(random, (0.36, 0.42), (0.62, 0.72), (0.74, 0.84), always_draw=True)
     lid_up, hung = random.random() < 0.5, random.random() < 0.35
     color = pick(random, ("white", "white", "brown", "black", "blue", "pink"))[1]
     seat = Material((234, 234, 230), gloss=0.6) if random.random() < 0.6 else Material(color, gloss=0.4)
@@ -79,10 +79,10 @@ def toilet(random: Random, *, width_m: Length = None, depth_m: Length = None, he
     return fitted("toilet", parts, (w, d, h), "white")
 
 
-def bathtub(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def bathtub(random: Random, wanted: WantedSize) -> Item:
     """A built-in tub behind a panel, an oval on claw feet, or a free-standing shell; tap at the right end."""
     kind = int(random.integers(3))
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (1.5, 1.8), (0.7, 0.82), (0.66, 0.74))
+    w, d, h = wanted.fill(random, (1.5, 1.8), (0.7, 0.82), (0.66, 0.74), always_draw=True)
     z, corner = h - 0.14, (12.0, 2.6, 3.4)[kind]
     foot = 0.12 if kind == 1 else 0.0
     word, color = ("white", CERAMIC.color) if kind != 1 else pick(random, ("white", "red", "blue", "black", "green"))
@@ -107,9 +107,9 @@ def bathtub(random: Random, *, width_m: Length = None, depth_m: Length = None, h
     return fitted("bathtub", parts, (w, d, h), word)
 
 
-def shower(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def shower(random: Random, wanted: WantedSize) -> Item:
     """A tray, thin metal frames without panes (a frosted band stands for the glass), and a pole with its head."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.8, 1.0), (0.8, 0.95), (1.95, 2.15))
+    w, d, h = wanted.fill(random, (0.8, 1.0), (0.8, 0.95), (1.95, 2.15), always_draw=True)
     metal = Material(pick(random, tuple(METALS), METALS)[1], gloss=0.7)
     tray = [(0, 0), (1, 0), (1, 0.12), (0.9, 0.125), (0.86, 0.07), (0, 0.06)]
     parts = [molded(tray, w, d, CERAMIC, 12), cylinder((0, 0, 0.062), 0.05, 0.006, STEEL, sides=10)]
@@ -136,9 +136,9 @@ def shower(random: Random, *, width_m: Length = None, depth_m: Length = None, he
     return fitted("shower", parts, (w, d, h), "")
 
 
-def mirror(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def mirror(random: Random, wanted: WantedSize) -> Item:
     """A framed looking glass for a wall, square, arched or oval, its glass in bands from pale sky to darker gray."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.4, 0.8), (0.025, 0.035), (0.55, 1.1))
+    w, d, h = wanted.fill(random, (0.4, 0.8), (0.025, 0.035), (0.55, 1.1), always_draw=True)
     word, color = pick(random, tuple(WOODS), WOODS)
     frame = Material(color, "wood", darker(color, 0.8), 0.2)
     if random.random() < 0.5:
@@ -164,17 +164,16 @@ def _sheet(x0: float, x1: float, z0: float, z1: float, y: float, wave: float, ma
     xs = np.linspace(x0, x1, 13)
     ys = y + wave * np.sin(np.arange(13) * 1.7)
     vertices = np.array([(x, e, z) for z in (z0, z1) for x, e in zip(xs, ys, strict=True)])
-    faces = [face for i in range(12) for face in ((i, i + 1, i + 14), (i, i + 14, i + 13))]
-    return Part(vertices, np.array(faces, np.int32), material)
+    return Part(vertices, grid_faces(2, 13), material)
 
 
-def towel(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def towel(random: Random, wanted: WantedSize) -> Item:
     """A towel over a wall rail, one or two abreast; a folded pile when a height below 0.3 m is asked for."""
     word, color = pick(random, CLOTHS)
     cloth = Material(color, "fabric", darker(color, 0.9), 0.04)
     border = Material(darker(color, 0.75 if sum(color) > 300 else 1.5), "fabric", color, 0.04)
-    if height_m is not None and height_m < 0.3:
-        w, d, h = sizes(random, (width_m, depth_m, height_m), (0.3, 0.45), (0.22, 0.32), (0.08, 0.2))
+    if wanted.height_m is not None and wanted.height_m < 0.3:
+        w, d, h = wanted.fill(random, (0.3, 0.45), (0.22, 0.32), (0.08, 0.2), always_draw=True)
         count = max(1, round(h / 0.05))
         parts = []
         for k in range(count):
@@ -182,7 +181,7 @@ def towel(random: Random, *, width_m: Length = None, depth_m: Length = None, hei
             shape = [(0, 0), (0.96, 0.004), (1, 0.022), (0.96, 0.044), (0, 0.048)]
             parts.append(moved(molded(shape, w * (1 - 0.03 * k), d, fold, 8), (0, 0.004 * (k % 2), 0.05 * k)))
         return fitted("towel", parts, (w, d, h), word)
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.45, 0.65), (0.07, 0.09), (0.6, 0.8))
+    w, d, h = wanted.fill(random, (0.45, 0.65), (0.07, 0.09), (0.6, 0.8), always_draw=True)
     bar, wall = h - 0.02, d / 2
     parts = [tube([(-w / 2, wall - 0.045, bar), (w / 2, wall - 0.045, bar)], 0.01, STEEL)]
     parts += [box((x - 0.012, wall - 0.055, bar - 0.02), (x + 0.012, wall, bar + 0.02), STEEL) for x in (-w / 2, w / 2)]
@@ -197,9 +196,9 @@ def towel(random: Random, *, width_m: Length = None, depth_m: Length = None, hei
     return fitted("towel", parts, (w, d, h), word)
 
 
-def washing_machine(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def washing_machine(random: Random, wanted: WantedSize) -> Item:
     """A cube with a round door of dark glass, a drawer for powder, a dial and a display."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.58, 0.62), (0.55, 0.65), (0.83, 0.88))
+    w, d, h = wanted.fill(random, (0.58, 0.62), (0.55, 0.65), (0.83, 0.88), always_draw=True)
     word, color = pick(random, ("white", "white", "white", "gray", "black"), METALS)
     enamel, y, z = Material(color, gloss=0.5), -d / 2 + 0.05, h * 0.46
     parts = [box((-w / 2, y, 0.02), (w / 2, d / 2, h - 0.03), enamel)]
@@ -224,11 +223,11 @@ def washing_machine(random: Random, *, width_m: Length = None, depth_m: Length =
     return fitted("washing machine", parts, (w, d, h), word, (top,))
 
 
-def laundry_basket(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def laundry_basket(random: Random, wanted: WantedSize) -> Item:
     """A tall wicker hamper with a lid, or an open plastic or wicker basket heaped with clothes."""
     lidded = random.random() < 0.35
     high = (0.5, 0.65) if lidded else (0.35, 0.55)
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.38, 0.55), (0.3, 0.42), high)
+    w, d, h = wanted.fill(random, (0.38, 0.55), (0.3, 0.42), high, always_draw=True)
     word, color = pick(random, ("beige", "light brown", "brown"), COLORS | WOODS)
     wicker = Material(color, "checks", darker(color, 0.65), 0.045)
     if random.random() < 0.5 and not lidded:
@@ -256,9 +255,9 @@ def laundry_basket(random: Random, *, width_m: Length = None, depth_m: Length = 
     return fitted("laundry basket", parts, (w, d, h), word)
 
 
-def ironing_board(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def ironing_board(random: Random, wanted: WantedSize) -> Item:
     """A padded board that tapers to one end on crossed legs, a rest at the other end, at times with the iron."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (1.2, 1.45), (0.32, 0.42), (0.86, 1.02))
+    w, d, h = wanted.fill(random, (1.2, 1.45), (0.32, 0.42), (0.86, 1.02), always_draw=True)
     iron, texture = random.random() < 0.6, str(random.choice(("stripes", "checks", "fabric", "plain")))
     word, color = pick(random, ("blue", "gray", "red", "green", "pink", "white", "beige", "purple"))
     cover = Material(color, texture, darker(color, 0.7 if random.random() < 0.5 else 1.5), 0.08)
@@ -290,7 +289,7 @@ def _iron(random: Random) -> list[Part]:
     return [extrude(sole, 0, 0.02, STEEL), body, tube(grip, 0.012, DARK, 6)]
 
 
-DESIGNS: dict[str, Design] = {
+DESIGNS = {
     "toilet": toilet, "bathtub": bathtub, "shower": shower, "mirror": mirror, "towel": towel,
     "washing machine": washing_machine, "laundry basket": laundry_basket, "ironing board": ironing_board,
 }  # fmt: skip

@@ -5,18 +5,16 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.random import Generator
 
 from placegraph.tools.simulator.catalogue._cabinet_parts import Fronts, finish, metal
-from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled, drawn
 from placegraph.tools.simulator.catalogue._upholstery import cloth, cushion
-from placegraph.tools.simulator.catalogue.tables import Size
 from placegraph.tools.simulator.color_palette import darker, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part
 from placegraph.tools.simulator.mesh_primitives import box, cylinder, tube, turned
 
 
-def _linen(random: Generator) -> tuple[str, Material]:
+def _linen(random: Random) -> tuple[str, Material]:
     """What a blanket is made of."""
     name, color = pick(random, ("white", "gray", "blue", "red", "green", "beige", "pink", "yellow", "purple", "brown"))
     texture = str(random.choice(["fabric", "fabric", "stripes", "checks", "leaves"]))
@@ -24,7 +22,7 @@ def _linen(random: Generator) -> tuple[str, Material]:
     return name, Material(color, texture, second, 0.25, int(random.integers(1000)))
 
 
-def _wooden(random: Generator, w: float, d: float, h: float, rail: float, frame: Material) -> list[Part]:
+def _wooden(random: Random, w: float, d: float, h: float, rail: float, frame: Material) -> list[Part]:
     """A wooden frame: posts, panelled or slatted headboard, a low footboard, and at times drawers in the side rails."""
     high = min(rail + 0.22, 0.7 * h)
     parts = [box((a - 0.03, y - 0.03, 0), (a + 0.03, y + 0.03, top), frame)
@@ -43,7 +41,7 @@ def _wooden(random: Generator, w: float, d: float, h: float, rail: float, frame:
     return parts
 
 
-def _boxspring(random: Generator, w: float, d: float, h: float, rail: float, cover: Material) -> list[Part]:
+def _boxspring(random: Random, w: float, d: float, h: float, rail: float, cover: Material) -> list[Part]:
     """An upholstered box on short feet with a padded headboard of upright cushions."""
     feet, count = metal(random), min(5, max(2, round(w / 0.35)))
     parts = [
@@ -58,7 +56,7 @@ def _boxspring(random: Generator, w: float, d: float, h: float, rail: float, cov
     return parts
 
 
-def _steel(random: Generator, w: float, d: float, h: float, rail: float) -> list[Part]:
+def _steel(random: Random, w: float, d: float, h: float, rail: float) -> list[Part]:
     """A frame of steel tubes with upright bars at head and foot."""
     steel, r, low = metal(random), 0.018, min(rail + 0.3, 0.75 * h)
     parts = []
@@ -77,11 +75,11 @@ def _steel(random: Generator, w: float, d: float, h: float, rail: float) -> list
     return [Part(np.maximum(part.vertices, (-np.inf, -np.inf, 0.0)), part.faces, part.material) for part in parts]
 
 
-def bed(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def bed(random: Random, wanted: WantedSize) -> Item:
     """A single or double bed: a wooden frame, an upholstered box or a steel frame, with the head at +y."""
     style = str(random.choice(["wooden", "boxspring", "steel", "drawers"]))
-    w = drawn(random, width_m, *((0.95, 1.1) if random.random() < 0.4 else (1.45, 1.85)))
-    d, h = drawn(random, depth_m, 2.02, 2.15), drawn(random, height_m, 0.85, 1.15)
+    w = drawn(random, wanted.width_m, *((0.95, 1.1) if random.random() < 0.4 else (1.45, 1.85)))
+    d, h = drawn(random, wanted.depth_m, 2.02, 2.15), drawn(random, wanted.height_m, 0.85, 1.15)
     rail, mattress = min(float(random.uniform(0.28, 0.36)), 0.35 * h), float(random.uniform(0.16, 0.24))
     frame = finish(random, 0.15)[1]
     if style == "boxspring":
@@ -100,7 +98,7 @@ def bed(random: Generator, *, width_m: Size = None, depth_m: Size = None, height
     return assembled("bed", parts + bedding, (w, d, h), name)
 
 
-def _bedding(random: Generator, w: float, d: float, low: float, top: float, high: float) -> tuple[str, list[Part]]:
+def _bedding(random: Random, w: float, d: float, low: float, top: float, high: float) -> tuple[str, list[Part]]:
     """Mattress, pillows, and a blanket that hangs over the sides and is folded back at the head; its colour word."""
     white = Material((232, 230, 224), "fabric", (216, 214, 208), 0.06)
     name, blanket = _linen(random)

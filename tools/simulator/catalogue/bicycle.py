@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._item_assembly import chance, circle, drawn, fitted, hoop, merged, plate_xz
+from placegraph.tools.simulator.catalogue._item_assembly import (
+    Random,
+    WantedSize,
+    chance,
+    circle,
+    drawn,
+    fitted,
+    hoop,
+    merged,
+    plate_xz,
+)
 from placegraph.tools.simulator.color_palette import METALS, VIVID, jitter, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part
 from placegraph.tools.simulator.mesh_primitives import Point, block, ellipsoid, moved, tube
@@ -88,7 +97,7 @@ def _drive(paint: Material) -> list[Part]:
     return [merged([ring, spider, sprocket]), merged([*chain]), merged(cranks), merged(pedals)]
 
 
-def _extras(random: np.random.Generator, paint: Material) -> list[Part]:
+def _extras(random: Random, paint: Material) -> list[Part]:
     """Mudguards, a lamp and a carrier or a basket, of a city bicycle."""
     parts = []
     for x, start, end in ((-_BASE_M, 0.1, 2.9), (_BASE_M, 0.9, 3.0)):
@@ -108,13 +117,7 @@ def _extras(random: np.random.Generator, paint: Material) -> list[Part]:
     return parts
 
 
-def bicycle(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def bicycle(random: Random, wanted: WantedSize) -> Item:
     """A bicycle along x, its front wheel at +x: a city one with guards, a mountain bike or a racer."""
     kind = int(random.integers(3))
     name, color = pick(random, (*VIVID, "black", "white", "gray", "blue"))
@@ -131,8 +134,9 @@ def bicycle(
         parts += _extras(random, paint)
     low = min(float(part.vertices[:, 2].min()) for part in parts)
     parts = [moved(part, (0, 0, -low)) for part in parts]
-    width = drawn(random, width_m, 1.6, 1.82)
-    return fitted("bicycle", parts, (width, depth_m, height_m or width * float(random.uniform(0.58, 0.63))), name)
+    width = drawn(random, wanted.width_m, 1.6, 1.82)
+    height = wanted.height_m or width * float(random.uniform(0.58, 0.63))
+    return fitted("bicycle", parts, (width, wanted.depth_m, height), name)
 
 
-DESIGNS: dict[str, Design] = {"bicycle": bicycle}
+DESIGNS = {"bicycle": bicycle}

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._item_assembly import chance, drawn, fitted, merged, plate_yz
+from placegraph.tools.simulator.catalogue._item_assembly import (
+    Random,
+    WantedSize,
+    chance,
+    drawn,
+    fitted,
+    merged,
+    plate_yz,
+)
 from placegraph.tools.simulator.catalogue.decoration import frame
 from placegraph.tools.simulator.color_palette import METALS, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part
@@ -54,19 +61,12 @@ def _ladder_radiator(width_m: float, depth_m: float, height_m: float, paint: Mat
     return [*posts, merged(bars)]
 
 
-def radiator(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def radiator(random: Random, wanted: WantedSize) -> Item:
     """A panel with ribs and a grille, a row of columns, or a ladder of bars; with a valve at its side."""
     kind = int(random.choice([0, 0, 1, 1, 2]))
-    tall = kind == 2 and height_m is None and width_m is None
-    width = drawn(random, width_m, *((0.45, 0.6) if tall else (0.7, 1.3)))
-    depth = drawn(random, depth_m, 0.09, 0.14)
-    height = drawn(random, height_m, *((0.9, 1.3) if tall else (0.5, 0.65)))
+    tall = kind == 2 and wanted.height_m is None and wanted.width_m is None
+    wide, high = ((0.45, 0.6), (0.9, 1.3)) if tall else ((0.7, 1.3), (0.5, 0.65))
+    width, depth, height = wanted.fill(random, wide, (0.09, 0.14), high)
     names = ("white", "white", "white", "gray", "black", "beige")
     name, color = pick(random, names) if kind else pick(random, ("white", "white", "beige"))
     paint = Material(color, gloss=0.3)
@@ -80,9 +80,7 @@ def radiator(
     return fitted("radiator", parts, (width, depth, height), name)
 
 
-def _door_panels(
-    random: np.random.Generator, width_m: float, height_m: float, thick_m: float, leaf: Material
-) -> list[Part]:
+def _door_panels(random: Random, width_m: float, height_m: float, thick_m: float, leaf: Material) -> list[Part]:
     """Raised fields on both faces, or a pane of glass with bars, by drawn design; none for a flush door."""
     kind = int(random.integers(5))
     field = Material(darker(leaf.color, 0.82), leaf.texture, leaf.second, leaf.scale_m, leaf.seed, leaf.gloss)
@@ -110,16 +108,9 @@ def _door_panels(
     return parts
 
 
-def door(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
-    """A door leaf with its hinges at -x and a handle on both faces, which stands out 8 mm beyond depth_m."""
-    width, depth = drawn(random, width_m, 0.82, 0.88), drawn(random, depth_m, 0.038, 0.042)
-    height = drawn(random, height_m, 2.0, 2.04)
+def door(random: Random, wanted: WantedSize) -> Item:
+    """A door leaf with its hinges at -x and a handle on both faces, which stands out 8 mm beyond the wanted depth."""
+    width, depth, height = wanted.fill(random, (0.82, 0.88), (0.038, 0.042), (2.0, 2.04))
     if chance(random, 0.5):
         name, color = pick(random, ("white", "white", "gray", "beige", "blue", "green"))
         leaf = Material(color, gloss=0.2)
@@ -147,16 +138,9 @@ def door(
     return fitted("door", parts, (width, None, height), name)
 
 
-def window(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def window(random: Random, wanted: WantedSize) -> Item:
     """A frame with one to three sashes, bars between glowing panes of a pale sky, and a handle."""
-    width, depth = drawn(random, width_m, 0.9, 1.8), drawn(random, depth_m, 0.06, 0.1)
-    height = drawn(random, height_m, 1.0, 1.5)
+    width, depth, height = wanted.fill(random, (0.9, 1.8), (0.06, 0.1), (1.0, 1.5))
     name, color = pick(random, ("white", "white", "white", "brown", "gray", "black"))
     rim = Material(color, "wood" if name == "brown" else "plain", darker(color, 0.75), 0.3, gloss=0.2)
     sky = jitter((186, 210, 234), random, 7)
@@ -185,17 +169,11 @@ def window(
     return fitted("window", parts, (width, depth, height), name)
 
 
-def stairs(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def stairs(random: Random, wanted: WantedSize) -> Item:
     """A straight flight that rises toward +y in equal steps: solid blocks, or treads between two stringers."""
-    width, height = drawn(random, width_m, 0.9, 1.1), drawn(random, height_m, 2.6, 2.9)
+    width, height = drawn(random, wanted.width_m, 0.9, 1.1), drawn(random, wanted.height_m, 2.6, 2.9)
     count = int(np.ceil(height / _RISE_M - 1e-9))
-    run = drawn(random, depth_m, 0.26 * count, 0.28 * count)
+    run = drawn(random, wanted.depth_m, 0.26 * count, 0.28 * count)
     rise, going = height / count, run / count
     name, color = pick(random, list(WOODS), WOODS)
     tread = Material(color, "wood", darker(color, 0.75), 0.4, int(random.integers(1000)), gloss=0.2)
@@ -222,4 +200,4 @@ def stairs(
     return fitted("stairs", [merged(parts), merged(stringers)], (width, run, height), name)
 
 
-DESIGNS: dict[str, Design] = {"radiator": radiator, "door": door, "window": window, "stairs": stairs}
+DESIGNS = {"radiator": radiator, "door": door, "window": window, "stairs": stairs}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
 from placegraph.tools.simulator.catalogue._item_assembly import (
+    Random,
+    WantedSize,
     chance,
     circle,
     drawn,
@@ -17,10 +18,10 @@ from placegraph.tools.simulator.catalogue._item_assembly import (
 )
 from placegraph.tools.simulator.color_palette import COLORS, METALS, MUTED, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import block, box, ellipsoid, extrude, tube, turned
+from placegraph.tools.simulator.mesh_primitives import block, box, ellipsoid, extrude, grid_faces, tube, turned
 
 
-def _wood(random: np.random.Generator) -> tuple[str, Material]:
+def _wood(random: Random) -> tuple[str, Material]:
     name, color = pick(random, list(WOODS), WOODS)
     return name, Material(color, "wood", darker(color, 0.75), 0.3, int(random.integers(1000)), gloss=0.2)
 
@@ -37,17 +38,11 @@ def frame(width_m: float, height_m: float, bar_m: float, y: tuple[float, float],
     return merged(bars)
 
 
-def picture(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def picture(random: Random, wanted: WantedSize) -> Item:
     """A painting in a plain or a stepped frame, with or without a mat, or a bare canvas."""
-    width, depth = drawn(random, width_m, 0.35, 1.1), drawn(random, depth_m, 0.02, 0.045)
-    height = width * float(random.choice([0.66, 0.75, 1.0, 1.3, 1.5])) if height_m is None else height_m
-    height = min(height, 1.2) if height_m is None else height
+    width, depth = drawn(random, wanted.width_m, 0.35, 1.1), drawn(random, wanted.depth_m, 0.02, 0.045)
+    height = width * float(random.choice([0.66, 0.75, 1.0, 1.3, 1.5])) if wanted.height_m is None else wanted.height_m
+    height = min(height, 1.2) if wanted.height_m is None else height
     first, second = (pick(random, (*VIVID, *MUTED))[1] for _ in range(2))
     image = Material(first, "picture", second, 0.0, int(random.integers(100_000)))
     kind = int(random.integers(4))
@@ -94,7 +89,7 @@ def _ticks(radius_m: float, y: float, material: Material) -> Part:
     return merged(strokes)
 
 
-def _case(random: np.random.Generator, radius_m: float, depth_m: float) -> tuple[str, list[Part], Color]:
+def _case(random: Random, radius_m: float, depth_m: float) -> tuple[str, list[Part], Color]:
     """The clock's body with its front rim, around (0, 0): round, square or a sun of rays; the dial's colour."""
     kind = int(random.choice([0, 1, 1, 1, 2]))
     name, color = pick(random, ("black", "white", "gray", "red", "blue", "green", "yellow"))
@@ -119,16 +114,10 @@ def _case(random: np.random.Generator, radius_m: float, depth_m: float) -> tuple
     return name, parts, dial
 
 
-def clock(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def clock(random: Random, wanted: WantedSize) -> Item:
     """A wall clock with hour strokes and two or three hands; one size that is given holds for both directions."""
-    size = drawn(random, height_m if width_m is None else width_m, 0.24, 0.4)
-    depth, radius = drawn(random, depth_m, 0.035, 0.06), size / 2
+    size = drawn(random, wanted.height_m if wanted.width_m is None else wanted.width_m, 0.24, 0.4)
+    depth, radius = drawn(random, wanted.depth_m, 0.035, 0.06), size / 2
     name, parts, dial = _case(random, radius, depth)
     ink = (228, 226, 220) if dial[0] < 100 else (26, 26, 30)
     y = -depth / 2
@@ -141,19 +130,12 @@ def clock(
     if chance(random, 0.5):
         red = Material(COLORS["red"])
         parts.append(_hand(float(random.uniform(0, 6.28)), radius * 0.75, radius * 0.02, y - 0.001, red))
-    return fitted("clock", parts, (width_m or size, depth, height_m or size), name)
+    return fitted("clock", parts, (wanted.width_m or size, depth, wanted.height_m or size), name)
 
 
-def rug(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def rug(random: Random, wanted: WantedSize) -> Item:
     """A rectangular rug with a border and perhaps fringes, or a round one with rings."""
-    width, depth = drawn(random, width_m, 1.2, 2.4), drawn(random, depth_m, 0.8, 1.7)
-    height = drawn(random, height_m, 0.01, 0.02)
+    width, depth, height = wanted.fill(random, (1.2, 2.4), (0.8, 1.7), (0.01, 0.02))
     name, color = pick(random, (*VIVID, *MUTED))
     texture = str(random.choice(["fabric", "stripes", "checks", "noise", "picture"]))
     second = darker(color, 0.75) if texture in ("fabric", "noise") else pick(random, (*VIVID, *MUTED))[1]
@@ -163,7 +145,7 @@ def rug(
     inset = float(random.uniform(0.05, 0.1)) * min(width, depth)
     low, high = height * 0.8, height
     if chance(random, 0.3):
-        if width_m is None and depth_m is None:
+        if wanted.width_m is None and wanted.depth_m is None:
             width = depth = min(width, depth) * 1.1
         shares = ((1.0, low, edge), (1 - 2 * inset / width, high, field), (0.4, high + 0.001, edge))
         parts = [extrude(circle(s * width / 2, 28, y_radius_m=s * depth / 2), 0, z, m) for s, z, m in shares]
@@ -192,26 +174,14 @@ def _panel(wide_m: float, tall_m: float, wave_m: float, folds: float, tied: bool
         y = wave_m * np.sin(2 * np.pi * folds * share)
         sheet.append(np.stack((share * wide * wide_m, y, np.full(columns, z * tall_m)), axis=1))
     front = np.concatenate(sheet)
-    faces = []
-    for i in range(len(rows) - 1):
-        for j in range(columns - 1):
-            a, b = i * columns + j, (i + 1) * columns + j
-            faces += [(a, a + 1, b + 1), (a, b + 1, b)]
-    outside = np.array(faces, np.int32)
+    outside = grid_faces(len(rows), columns)
     behind = front + np.array([0, 0.004, 0])
     return Part(np.concatenate((front, behind)), np.concatenate((outside, outside[:, ::-1] + len(front))), cloth)
 
 
-def curtain(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def curtain(random: Random, wanted: WantedSize) -> Item:
     """Two wavy cloths on a rod, drawn aside or tied back, with the middle between them open."""
-    width, depth = drawn(random, width_m, 1.5, 1.8), drawn(random, depth_m, 0.1, 0.14)
-    height = drawn(random, height_m, 2.0, 2.3)
+    width, depth, height = wanted.fill(random, (1.5, 1.8), (0.1, 0.14), (2.0, 2.3))
     name, color = pick(random, (*VIVID, *MUTED))
     texture = str(random.choice(["plain", "fabric", "noise"]))  # folds would tear a pattern apart
     cloth = Material(color, texture, darker(color, 0.8), float(random.uniform(0.1, 0.3)), int(random.integers(1000)))
@@ -240,4 +210,4 @@ def curtain(
     return fitted("curtain", parts, (width, depth, height), name)
 
 
-DESIGNS: dict[str, Design] = {"picture": picture, "clock": clock, "rug": rug, "curtain": curtain}
+DESIGNS = {"picture": picture, "clock": clock, "rug": rug, "curtain": curtain}

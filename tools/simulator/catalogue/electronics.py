@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.random import Generator
 
+from placegraph.tools.simulator.catalogue._appliance_parts import knob
 from placegraph.tools.simulator.catalogue._cabinet_parts import finish, metal
-from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
-from placegraph.tools.simulator.catalogue.tables import Size
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled, drawn
 from placegraph.tools.simulator.color_palette import COLORS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import Point, block, box, cylinder, extrude, lathe, moved, turned
+from placegraph.tools.simulator.mesh_primitives import block, box, cylinder, extrude, lathe, quads
 
 _BLACK = Material((24, 24, 27), gloss=0.4)
 _PAPER = Material((244, 243, 238))
 
 
-def _case(random: Generator, names: tuple[str, ...] = ("black", "black", "gray", "white")) -> tuple[str, Material]:
+def _case(random: Random, names: tuple[str, ...] = ("black", "black", "gray", "white")) -> tuple[str, Material]:
     """Plastic of a device: its word and material."""
     name, color = pick(random, names)
     return name, Material(color, gloss=0.3)
 
 
-def _picture(random: Generator, dark: float) -> Material:
+def _picture(random: Random, dark: float) -> Material:
     """A screen that is dark with a probability, or else shines."""
     if random.random() < dark:
         return Material(jitter((26, 28, 34), random, 4), gloss=0.8)
@@ -33,19 +32,14 @@ def _picture(random: Generator, dark: float) -> Material:
     return Material(colors[0], "screen", colors[1], 0.0, int(random.integers(100000)), gloss=0.2, glow=0.75)
 
 
-def _disc(center: Point, radius_m: float, out_m: float, material: Material, sides: int = 20) -> Part:
-    """A round plate around a center on a front, that stands `out_m` out of it toward -y."""
-    return moved(turned(cylinder((0, 0, 0), radius_m, out_m, material, sides=sides), np.pi / 2, "x"), center)
-
-
-def tv(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def tv(random: Random, wanted: WantedSize) -> Item:
     """A wide thin screen: on two feet, on a plate, or flat for a wall (every one with a depth below 0.12 m)."""
     style = str(random.choice(["feet", "plate", "flat"]))
-    if depth_m is not None and (depth_m < 0.12) != (style == "flat"):
-        style = "flat" if depth_m < 0.12 else "feet"
-    w = drawn(random, width_m, 0.85, 1.5)
-    d = drawn(random, depth_m, *((0.04, 0.07) if style == "flat" else (0.2, 0.28)))
-    h = drawn(random, height_m, *((0.565 * w, 0.585 * w) if style == "flat" else (0.62 * w, 0.66 * w)))
+    if wanted.depth_m is not None and (wanted.depth_m < 0.12) != (style == "flat"):
+        style = "flat" if wanted.depth_m < 0.12 else "feet"
+    w = drawn(random, wanted.width_m, 0.85, 1.5)
+    d = drawn(random, wanted.depth_m, *((0.04, 0.07) if style == "flat" else (0.2, 0.28)))
+    h = drawn(random, wanted.height_m, *((0.565 * w, 0.585 * w) if style == "flat" else (0.62 * w, 0.66 * w)))
     name, case = "black", Material(jitter((30, 30, 33), random, 5), gloss=0.4)
     foot = 0.0 if style == "flat" else 0.08 * h
     thick, edge = min(d, 0.05), 0.012
@@ -74,11 +68,10 @@ def tv(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_
     return assembled("tv", parts, (w, d, h), name)
 
 
-def monitor(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def monitor(random: Random, wanted: WantedSize) -> Item:
     """A screen on a tall neck: on a round foot, a V-shaped foot, or an all-in-one with a chin."""
     style = str(random.choice(["round", "plate", "chin"]))
-    w, d = drawn(random, width_m, 0.48, 0.64), drawn(random, depth_m, 0.17, 0.23)
-    h = drawn(random, height_m, 0.42, 0.52)
+    w, d, h = wanted.fill(random, (0.48, 0.64), (0.17, 0.23), (0.42, 0.52))
     name, case = _case(random, ("black", "black", "gray", "white"))
     edge, chin = float(random.uniform(0.012, 0.022)), 0.2 * h if style == "chin" else 0.03
     low = 0.27 * h if style != "chin" else 0.2 * h
@@ -93,13 +86,11 @@ def monitor(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
     else:
         parts.append(box((-0.36 * w, -d / 2, 0), (0.36 * w, d / 2, 0.014), foot))
     if style == "chin":
-        parts.append(_disc((0, -0.04, low + chin / 2), 0.018, 0.002, _BLACK, 10))
+        parts.append(knob(0, -0.04, low + chin / 2, 0.018, 0.002, _BLACK, 10))
     return assembled("monitor", parts, (w, d, h), name)
 
 
-def _keys(
-    random: Generator, x0: float, x1: float, y0: float, y1: float, z: float, caps: Color, rows: int
-) -> list[Part]:
+def _keys(random: Random, x0: float, x1: float, y0: float, y1: float, z: float, caps: Color, rows: int) -> list[Part]:
     """Rows of key tops at height z, the lowest with a space bar; y grows to the back."""
     tops: list[tuple[float, float, float, float]] = []
     pitch = (y1 - y0) / rows
@@ -120,15 +111,12 @@ def _keys(
 
 def _tops(rectangles: list[tuple[float, float, float, float]], z: float, material: Material) -> Part:
     """Level rectangles (x0, x1, y0, y1) at height z that face up, as one part."""
-    vertices = np.array([p for a, b, c, d in rectangles for p in ((a, c, z), (b, c, z), (b, d, z), (a, d, z))], float)
-    faces = [(4 * k + i, 4 * k + j, 4 * k + m) for k in range(len(rectangles)) for i, j, m in ((0, 1, 2), (0, 2, 3))]
-    return Part(vertices, np.array(faces, np.int32), material)
+    return quads([((a, c, z), (b, c, z), (b, d, z), (a, d, z)) for a, b, c, d in rectangles], material)
 
 
-def keyboard(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def keyboard(random: Random, wanted: WantedSize) -> Item:
     """A flat wedge with five or six rows of keys, some with a number block."""
-    w, d = drawn(random, width_m, 0.36, 0.46), drawn(random, depth_m, 0.125, 0.165)
-    h = drawn(random, height_m, 0.022, 0.036)
+    w, d, h = wanted.fill(random, (0.36, 0.46), (0.125, 0.165), (0.022, 0.036))
     name, case = _case(random)
     caps = jitter(darker(case.color, 0.6) if name in ("white", "gray") and random.random() < 0.5 else
                   (COLORS["white"] if name != "black" else (74, 74, 80)), random, 5)  # fmt: skip
@@ -144,10 +132,9 @@ def keyboard(random: Generator, *, width_m: Size = None, depth_m: Size = None, h
     return assembled("keyboard", parts, (w, d, h), name)
 
 
-def laptop(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def laptop(random: Random, wanted: WantedSize) -> Item:
     """An open laptop: a slab with keys and touch pad, and a screen that leans back behind its hinge."""
-    w, d = drawn(random, width_m, 0.31, 0.38), drawn(random, depth_m, 0.27, 0.33)
-    h = drawn(random, height_m, 0.2, 0.25)
+    w, d, h = wanted.fill(random, (0.31, 0.38), (0.27, 0.33), (0.2, 0.25))
     name, case = _case(random, ("gray", "gray", "black", "white", "blue"))
     base, lean = 0.75 * d, 0.25 * d
     y0, hinge = -d / 2, d / 2 - lean
@@ -167,11 +154,10 @@ def laptop(random: Generator, *, width_m: Size = None, depth_m: Size = None, hei
     return assembled("laptop", parts, (w, d, h), name)
 
 
-def printer(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def printer(random: Random, wanted: WantedSize) -> Item:
     """A box that prints: flat with a scanner lid, with paper standing behind, or a tall one with paper drawers."""
     style = str(random.choice(["scanner", "feeder", "laser"]))
-    w, d = drawn(random, width_m, 0.38, 0.48), drawn(random, depth_m, 0.36, 0.46)
-    h = drawn(random, height_m, *((0.3, 0.4) if style != "scanner" else (0.17, 0.25)))
+    w, d, h = wanted.fill(random, (0.38, 0.48), (0.36, 0.46), (0.3, 0.4) if style != "scanner" else (0.17, 0.25))
     name, case = _case(random, ("white", "gray", "black", "white"))
     dark = Material(darker(case.color, 0.45), gloss=0.2)
     tray, top = 0.22 * d, h if style != "feeder" else 0.62 * h
@@ -190,7 +176,7 @@ def printer(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
     parts.append(box((-0.24 * w, 0.01 - d / 2, z + 0.008), (0.24 * w, y + 0.06, z + 0.016), _PAPER))
     screen = Material((70, 120, 180), "screen", (200, 220, 240), 0.0, int(random.integers(1000)), glow=0.6)
     parts.append(box((0.1 * w, y - 0.006, lip + 0.25 * band), (0.28 * w, y, lip + 0.8 * band), screen))
-    parts += [_disc((w * a, y, lip + band / 2), 0.009, 0.005, m, 8)
+    parts += [knob(w * a, y, lip + band / 2, 0.009, 0.005, m, 8)
               for a, m in ((0.34, Material((60, 170, 90), glow=0.3)), (0.4, dark))]  # fmt: skip
     if style == "feeder":
         z = top - 0.02
@@ -204,7 +190,7 @@ def printer(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
     return assembled("printer", parts, (w, d, h), name)
 
 
-def _cylinder_of_cloth(random: Generator, w: float, d: float, h: float) -> tuple[str, list[Part]]:
+def _cylinder_of_cloth(random: Random, w: float, d: float, h: float) -> tuple[str, list[Part]]:
     """A smart speaker: cloth between two rims, with a ring of light on top; its colour word and parts."""
     name, color = pick(random, ("black", "gray", "white", "blue", "red"))
     cloth = Material(color, "grille", darker(color, 0.6), 0.02)
@@ -218,14 +204,14 @@ def _cylinder_of_cloth(random: Generator, w: float, d: float, h: float) -> tuple
     return name, [Part(part.vertices * (w, d, 1), part.faces, part.material) for part in parts]
 
 
-def speaker(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def speaker(random: Random, wanted: WantedSize) -> Item:
     """A loudspeaker: a tall or small box with round cones, or a cylinder of cloth."""
     style = str(random.choice(["small", "tall", "round"]))
-    if height_m is not None:
-        style = "tall" if height_m > 0.6 else ("small" if style == "tall" else style)
-    w = drawn(random, width_m, *{"small": (0.15, 0.2), "tall": (0.18, 0.26), "round": (0.1, 0.16)}[style])
-    d = drawn(random, depth_m, *((w, w) if style == "round" else (1.0 * w, 1.3 * w)))
-    h = drawn(random, height_m, *{"small": (0.25, 0.36), "tall": (0.85, 1.15), "round": (0.14, 0.28)}[style])
+    if wanted.height_m is not None:
+        style = "tall" if wanted.height_m > 0.6 else ("small" if style == "tall" else style)
+    w = drawn(random, wanted.width_m, *{"small": (0.15, 0.2), "tall": (0.18, 0.26), "round": (0.1, 0.16)}[style])
+    d = drawn(random, wanted.depth_m, *((w, w) if style == "round" else (1.0 * w, 1.3 * w)))
+    h = drawn(random, wanted.height_m, *{"small": (0.25, 0.36), "tall": (0.85, 1.15), "round": (0.14, 0.28)}[style])
     if style == "round":
         name, parts = _cylinder_of_cloth(random, w, d, h)
         return assembled("speaker", parts, (w, d, h), name)
@@ -245,9 +231,9 @@ def speaker(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
     )
     for z, share in spots:
         r = share * w
-        parts.append(_disc((0, front, z), r, 0.008, rim, 12))
-        parts.append(_disc((0, front, z), 0.86 * r, 0.010, cone, 12))
-        parts.append(_disc((0, front, z), 0.35 * r, 0.012, Material((88, 88, 92)), 8))
+        parts.append(knob(0, front, z, r, 0.008, rim, 12))
+        parts.append(knob(0, front, z, 0.86 * r, 0.010, cone, 12))
+        parts.append(knob(0, front, z, 0.35 * r, 0.012, Material((88, 88, 92)), 8))
     return assembled("speaker", parts, (w, d, h), name)
 
 

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._item_assembly import arc, chance, drawn, fitted, hoop, merged
+from placegraph.tools.simulator.catalogue._item_assembly import (
+    Random,
+    WantedSize,
+    arc,
+    chance,
+    drawn,
+    fitted,
+    hoop,
+    merged,
+)
 from placegraph.tools.simulator.color_palette import COLORS, METALS, VIVID, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part
 from placegraph.tools.simulator.mesh_primitives import block, box, cylinder, ellipsoid, lathe, moved, tube, turned
@@ -13,13 +21,7 @@ from placegraph.tools.simulator.mesh_primitives import block, box, cylinder, ell
 _ANY = (*VIVID, "white", "black", "gray", "brown", "beige")
 
 
-def cup(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def cup(random: Random, wanted: WantedSize) -> Item:
     """A straight mug, a round one, or a teacup on a saucer: with a handle to one side and a drink inside."""
     kind = int(random.integers(3))
     name, color = pick(random, (*VIVID, "white", "white", "black", "gray", "beige"))
@@ -27,7 +29,7 @@ def cup(
     glaze = Material(color, texture, jitter(COLORS["white"], random), 0.06, int(random.integers(1000)), 0.5)
     plain = Material(color, gloss=0.5)
     drink = Material((58, 36, 24) if chance(random, 0.6) else darker(color, 0.5), gloss=0.4)
-    tall = drawn(random, height_m, *((0.055, 0.07) if kind == 2 else (0.085, 0.115)))
+    tall = drawn(random, wanted.height_m, *((0.055, 0.07) if kind == 2 else (0.085, 0.115)))
     wide = tall * float(random.uniform(0.38, 0.47)) * (1.5 if kind == 2 else 1.0)
     shares = (((0.97, 0), (1, 0.5)), ((0.7, 0), (1.05, 0.45)), ((0.5, 0), (0.8, 0.4)))[kind]
     wall = [(0.0, 0.0), *((r * wide, z * tall) for r, z in shares), (wide, tall), (wide * 0.88, tall)]
@@ -38,18 +40,12 @@ def cup(
     if kind == 2:
         plate = lathe([(0, -0.008), (wide, -0.008), (wide * 1.8, 0.006), (wide, -0.003), (0, -0.003)], plain, sides=12)
         parts.append(plate)
-    return fitted("cup", parts, (width_m, depth_m, tall), name)
+    return fitted("cup", parts, (wanted.width_m, wanted.depth_m, tall), name)
 
 
-def bowl(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def bowl(random: Random, wanted: WantedSize) -> Item:
     """A deep or a flat bowl on a foot, of one colour inside and another outside, empty or with fruit."""
-    radius = drawn(random, depth_m if width_m is None else width_m, 0.14, 0.3) / 2
+    radius = drawn(random, wanted.depth_m if wanted.width_m is None else wanted.width_m, 0.14, 0.3) / 2
     tall = radius * float(random.uniform(0.6, 0.95))
     name, color = pick(random, _ANY)
     texture = str(random.choice(["plain", "plain", "stripes", "wood"]))
@@ -67,11 +63,11 @@ def bowl(
             fruit = Material(pick(random, ("red", "green", "orange", "yellow"))[1], gloss=0.3)
             at = (0.36 * radius * float(np.cos(2.1 * k)), 0.36 * radius * float(np.sin(2.1 * k)), 0.36 * tall + size)
             parts.append(ellipsoid(at if k < 3 else (0, 0, 0.5 * tall + size), (size, size, size), fruit, sides=6))
-    item_sizes = (width_m or 2 * radius, depth_m or 2 * radius, height_m)
-    return fitted("bowl", parts, item_sizes, name)
+    sizes = (wanted.width_m or 2 * radius, wanted.depth_m or 2 * radius, wanted.height_m)
+    return fitted("bowl", parts, sizes, name)
 
 
-def _wine(random: np.random.Generator, tall_m: float) -> tuple[str, list[Part]]:
+def _wine(random: Random, tall_m: float) -> tuple[str, list[Part]]:
     name, glass = [("green", (34, 62, 40)), ("brown", (78, 44, 24)), ("green", (92, 128, 84))][int(random.integers(3))]
     body = Material(jitter(glass, random, 5), gloss=0.8)
     foil = Material(pick(random, ("red", "black", "yellow", "white"))[1], gloss=0.4)
@@ -84,7 +80,7 @@ def _wine(random: np.random.Generator, tall_m: float) -> tuple[str, list[Part]]:
     return name, parts
 
 
-def _water(random: np.random.Generator, tall_m: float) -> tuple[str, list[Part]]:
+def _water(random: Random, tall_m: float) -> tuple[str, list[Part]]:
     plastic = Material(jitter((176, 208, 226), random, 6), gloss=0.7)
     lid_name, lid = pick(random, ("blue", "blue", "red", "green", "white"))
     r = tall_m * 0.14
@@ -106,7 +102,7 @@ def _water(random: np.random.Generator, tall_m: float) -> tuple[str, list[Part]]
     return "blue" if lid_name == "blue" else "", parts
 
 
-def _sport(random: np.random.Generator, tall_m: float) -> tuple[str, list[Part]]:
+def _sport(random: Random, tall_m: float) -> tuple[str, list[Part]]:
     name, color = pick(random, (*VIVID, "white", "black", "gray"))
     steel, cap = Material(color, gloss=0.6), Material(METALS["black"], gloss=0.3)
     r = tall_m * 0.15
@@ -118,20 +114,14 @@ def _sport(random: np.random.Generator, tall_m: float) -> tuple[str, list[Part]]
     return name, parts
 
 
-def bottle(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def bottle(random: Random, wanted: WantedSize) -> Item:
     """A wine bottle with label and foil, a plastic water bottle, or a steel one with a carrying loop."""
-    tall = drawn(random, height_m, 0.22, 0.33)
+    tall = drawn(random, wanted.height_m, 0.22, 0.33)
     name, parts = (_wine, _wine, _water, _sport)[int(random.integers(4))](random, tall)
-    return fitted("bottle", parts, (width_m, depth_m, tall), name)
+    return fitted("bottle", parts, (wanted.width_m, wanted.depth_m, tall), name)
 
 
-def _volume(random: np.random.Generator, size: tuple[float, float, float]) -> tuple[str, list[Part]]:
+def _volume(random: Random, size: tuple[float, float, float]) -> tuple[str, list[Part]]:
     """One lying book: two boards and a spine to its left around the pages, a title's field on the cover."""
     (w, d, h), board = size, min(0.003, size[2] * 0.15)
     name, color = pick(random, (*VIVID, "black", "brown", "gray", "white"))
@@ -154,16 +144,10 @@ def _volume(random: np.random.Generator, size: tuple[float, float, float]) -> tu
     return name, parts
 
 
-def book(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def book(random: Random, wanted: WantedSize) -> Item:
     """One closed book, or a crooked pile of two to four, lying."""
     count = int(random.choice([1, 1, 2, 3, 4]))
-    width, z = drawn(random, width_m, 0.13, 0.2), 0.0
+    width, z = drawn(random, wanted.width_m, 0.13, 0.2), 0.0
     parts: list[Part] = []
     words: list[str] = []
     for k in range(count):
@@ -173,7 +157,7 @@ def book(
         turn = float(random.uniform(-0.25, 0.25)) if count > 1 else 0.0
         parts += [moved(turned(part, turn), (0, 0, z)) for part in volume]
         z, words = z + size[2], [*words, word]
-    return fitted("book", parts, (width_m, depth_m, height_m), words[0] if count == 1 else "")
+    return fitted("book", parts, wanted, words[0] if count == 1 else "")
 
 
 def _flaps(size: tuple[float, float, float], card: Material) -> list[Part]:
@@ -188,16 +172,10 @@ def _flaps(size: tuple[float, float, float], card: Material) -> list[Part]:
     return parts
 
 
-def carton(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def carton(random: Random, wanted: WantedSize) -> Item:
     """A closed carton with tape and label, an open one with its flaps out, or a storage box with a lid."""
-    w, d = drawn(random, width_m, 0.25, 0.55), drawn(random, depth_m, 0.2, 0.4)
-    h, kind = drawn(random, height_m, 0.18, 0.4), int(random.integers(4))
+    w, d = drawn(random, wanted.width_m, 0.25, 0.55), drawn(random, wanted.depth_m, 0.2, 0.4)
+    h, kind = drawn(random, wanted.height_m, 0.18, 0.4), int(random.integers(4))
     shade = jitter((178, 138, 92), random)
     card, tape = Material(shade, "noise", darker(shade, 0.93), 0.05), Material((206, 178, 128), gloss=0.4)
     label = Material((234, 232, 226), "grille", (120, 120, 120), 0.0)
@@ -221,10 +199,10 @@ def carton(
         parts.append(block((0, 0, h * 0.78), (w, d, h * 0.22), Material(darker(color, 0.8))))
         parts.append(block((0, -d * 0.475, h * 0.4), (w * 0.24, 0.008, h * 0.2), label))
         parts.append(block((0, -d * 0.475, h * 0.62), (w * 0.2, 0.01, h * 0.06), Material((40, 38, 38))))
-    return fitted("box", parts, (width_m, depth_m, height_m), name)
+    return fitted("box", parts, wanted, name)
 
 
-def _pedal_bin(random: np.random.Generator, r: float, tall_m: float, skin: Material) -> list[Part]:
+def _pedal_bin(random: Random, r: float, tall_m: float, skin: Material) -> list[Part]:
     dark = Material((30, 29, 30))
     return [
         cylinder((0, 0, 0), r, tall_m * 0.06, dark),
@@ -236,16 +214,9 @@ def _pedal_bin(random: np.random.Generator, r: float, tall_m: float, skin: Mater
     ]
 
 
-def _paper_basket(random: np.random.Generator, r: float, tall_m: float, skin: Material) -> list[Part]:
+def _paper_basket(random: Random, r: float, tall_m: float, skin: Material) -> list[Part]:
     mesh = Material(skin.color, str(random.choice(["grille", "plain"])), darker(skin.color, 0.45), 0.03)
-    shell = [
-        (0, 0),
-        (r * 0.75, 0),
-        (r, tall_m),
-        (r * 0.96, tall_m),
-        (r * 0.73, tall_m * 0.06),
-        (0, tall_m * 0.06),
-    ]
+    shell = [(0, 0), (r * 0.75, 0), (r, tall_m), (r * 0.96, tall_m), (r * 0.73, tall_m * 0.06), (0, tall_m * 0.06)]
     rim = turned(hoop((0, 0, 0), r, tall_m * 0.018, Material((30, 29, 30))), np.pi / 2, "x")
     parts = [lathe(shell, mesh), moved(rim, (0, 0, tall_m))]
     paper = Material((232, 230, 224), "noise", (200, 198, 190), 0.04)
@@ -255,7 +226,7 @@ def _paper_basket(random: np.random.Generator, r: float, tall_m: float, skin: Ma
     return parts
 
 
-def _swing_bin(random: np.random.Generator, r: float, tall_m: float, skin: Material) -> list[Part]:
+def _swing_bin(random: Random, r: float, tall_m: float, skin: Material) -> list[Part]:
     """Square: a lathe of four sides, turned so that they face the axes."""
     lid, dark = Material(darker(skin.color, float(random.uniform(0.5, 0.7))), gloss=0.4), Material((30, 29, 30))
     s, wide = r * 0.95, r * 1.39
@@ -269,23 +240,17 @@ def _swing_bin(random: np.random.Generator, r: float, tall_m: float, skin: Mater
     ]
 
 
-def trash_can(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def trash_can(random: Random, wanted: WantedSize) -> Item:
     """A pedal bin with a dome, an open paper basket of mesh, or a square bin with a swing lid."""
     build_parts, tall = (
         (_pedal_bin, _paper_basket, _swing_bin)[int(random.integers(3))],
-        drawn(random, height_m, 0.28, 0.65),
+        drawn(random, wanted.height_m, 0.28, 0.65),
     )
     name, color = pick(random, ("gray", "gray", "black", "white", "blue", "green", "red"))
     parts = build_parts(random, tall * float(random.uniform(0.27, 0.36)), tall, Material(color, gloss=0.6))
-    return fitted("trash can", parts, (width_m, depth_m, tall), name)
+    return fitted("trash can", parts, (wanted.width_m, wanted.depth_m, tall), name)
 
 
-DESIGNS: dict[str, Design] = {
+DESIGNS = {
     "cup": cup, "bowl": bowl, "bottle": bottle, "book": book, "box": carton, "trash can": trash_can,
 }  # fmt: skip

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._item_assembly import chance, circle, drawn, fitted, loft, merged, plate_xz
+from placegraph.tools.simulator.catalogue._item_assembly import (
+    Random,
+    WantedSize,
+    chance,
+    circle,
+    drawn,
+    fitted,
+    loft,
+    merged,
+    plate_xz,
+)
 from placegraph.tools.simulator.color_palette import METALS, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
 from placegraph.tools.simulator.mesh_primitives import block, box, moved, tube, turned
@@ -53,7 +62,7 @@ def _neck(top_m: float, nut_m: float, head_m: float, y: float, wood: Material, s
     return [board, merged(frets), back, head, merged(pegs)]
 
 
-def _acoustic(random: np.random.Generator) -> tuple[str, list[Part]]:
+def _acoustic(random: Random) -> tuple[str, list[Part]]:
     name, color = pick(random, ("light brown", "light brown", "beige", "brown", "black"), WOODS)
     top = Material(color, "wood", darker(color, 0.85), 0.2, int(random.integers(1000)), gloss=0.5)
     side, steel = (
@@ -73,7 +82,7 @@ def _acoustic(random: np.random.Generator) -> tuple[str, list[Part]]:
     return name, [*parts, *_neck(0.4, 0.84, 1.0, -0.05, wood, steel), merged(strings)]
 
 
-def _electric(random: np.random.Generator) -> tuple[str, list[Part]]:
+def _electric(random: Random) -> tuple[str, list[Part]]:
     """A thin coloured body with two horns, pickups and knobs."""
     name, color = pick(random, (*VIVID, "black", "white"))
     paint, steel, dark = (
@@ -97,13 +106,7 @@ def _electric(random: np.random.Generator) -> tuple[str, list[Part]]:
     return name, [*parts, *_neck(0.36, 0.84, 1.0, -0.03, maple, steel), merged(strings)]
 
 
-def guitar(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def guitar(random: Random, wanted: WantedSize) -> Item:
     """An acoustic or an electric guitar that leans back on a stand of black tubes."""
     name, parts = (_acoustic if chance(random, 0.6) else _electric)(random)
     parts = [turned(moved(part, (0, 0, 0.06)), -0.1, "x", (0, 0, 0.06)) for part in parts]
@@ -118,7 +121,7 @@ def guitar(
             )
         )
     parts.append(tube([(0, 0.1, 0.38), (0, 0.22, 0.008)], 0.009, black, sides=5))
-    return fitted("guitar", parts, (width_m, depth_m, drawn(random, height_m, 0.95, 1.08)), name)
+    return fitted("guitar", parts, (wanted.width_m, wanted.depth_m, drawn(random, wanted.height_m, 0.95, 1.08)), name)
 
 
 def _keys(width_m: float, front_m: float, back_m: float, z: float) -> list[Part]:
@@ -136,17 +139,11 @@ def _keys(width_m: float, front_m: float, back_m: float, z: float) -> list[Part]
     return [merged(whites), merged(blacks)]
 
 
-def piano(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def piano(random: Random, wanted: WantedSize) -> Item:
     """An upright piano with keys, music stand and pedals; or a slender electric one between two side panels."""
-    w, d = drawn(random, width_m, 1.35, 1.52), drawn(random, depth_m, 0.52, 0.64)
+    w, d = drawn(random, wanted.width_m, 1.35, 1.52), drawn(random, wanted.depth_m, 0.52, 0.64)
     slim = chance(random, 0.3)
-    h = drawn(random, height_m, *((0.82, 0.95) if slim else (1.05, 1.28)))
+    h = drawn(random, wanted.height_m, *((0.82, 0.95) if slim else (1.05, 1.28)))
     name, color = pick(random, ("black", "black", "brown", "white"), WOODS)
     seed, gloss = int(random.integers(1000)), float(random.uniform(0.3, 0.9))
     wood = Material(color, "wood" if name == "brown" else "plain", darker(color, 0.75), 0.5, seed, gloss)
@@ -172,7 +169,7 @@ def piano(
         parts.append(box((0.05 - w / 2, d / 2 - 0.05, 0.1), (w / 2 - 0.05, d / 2 - 0.03, 0.3 * h), wood))
     parts.append(merged([block((k * 0.07, pedal_y, 0.05), (0.035, 0.12, 0.015), brass) for k in (-1, 0, 1)]))
     lid = () if slim else (SupportSurface(0.02 - w / 2, d / 2 - body + 0.01, w / 2 - 0.02, d / 2 - 0.01, h),)
-    return fitted("piano", parts, (width_m, depth_m, h), name, lid)
+    return fitted("piano", parts, (wanted.width_m, wanted.depth_m, h), name, lid)
 
 
-DESIGNS: dict[str, Design] = {"guitar": guitar, "piano": piano}
+DESIGNS = {"guitar": guitar, "piano": piano}

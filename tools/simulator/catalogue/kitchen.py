@@ -6,20 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
 from placegraph.tools.simulator.catalogue._appliance_parts import fronts, knob, molded, tap
-from placegraph.tools.simulator.catalogue._item_assembly import fitted, merged, sizes
-from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL, Length, Random
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, fitted, merged
+from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL
 from placegraph.tools.simulator.catalogue.bathroom import washbasin
 from placegraph.tools.simulator.color_palette import COLORS, METALS, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
-from placegraph.tools.simulator.mesh_primitives import (
-    Point,
-    block,
-    box,
-    cylinder,
-    moved,
-)
+from placegraph.tools.simulator.mesh_primitives import Point, block, box, cylinder, moved
 
 DISPLAY = Material((96, 220, 190), glow=0.8)
 ENAMELS = (*("white",) * 6, *("gray",) * 4, "black", "black", "red", "beige", "blue", "green")
@@ -31,11 +24,11 @@ def enamel_finish(random: Random) -> tuple[str, Material]:
     return name, Material(jitter((COLORS | METALS)[name], random, 6), gloss=0.5)
 
 
-def refrigerator(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def refrigerator(random: Random, wanted: WantedSize) -> Item:
     """Two doors one above the other, or side by side, or one tall door with notes on it."""
     kind = int(random.integers(3))
     wide = (0.8, 0.95) if kind == 1 else (0.55, 0.7)
-    w, d, h = sizes(random, (width_m, depth_m, height_m), wide, (0.6, 0.72), (1.5, 2.0))
+    w, d, h = wanted.fill(random, wide, (0.6, 0.72), (1.5, 2.0), always_draw=True)
     word, enamel = enamel_finish(random)
     y = -d / 2 + 0.1  # the body's front; the doors are 6 cm thick, the handles stand off 4 cm
     parts = [box((-w / 2, y + 0.012, 0.06), (w / 2, d / 2, h), replace(enamel, color=darker(enamel.color, 0.94)))]
@@ -76,10 +69,12 @@ def _notes(random: Random, w: float, y: float, h: float) -> list[Part]:
     return parts
 
 
-def stove(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def stove(random: Random, wanted: WantedSize) -> Item:
     """A cooker: rings or gas burners on top, a row of knobs, the oven's door with window and bar, a drawer below."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.5, 0.75), (0.58, 0.64), (0.86, 0.92))
-    back = 0.0 if height_m is not None or random.random() < 0.6 else 0.16  # a given height is that of the worktop
+    w, d, h = wanted.fill(random, (0.5, 0.75), (0.58, 0.64), (0.86, 0.92), always_draw=True)
+    back = (
+        0.0 if wanted.height_m is not None or random.random() < 0.6 else 0.16
+    )  # a given height is that of the worktop
     word, enamel = enamel_finish(random)
     gas, z, y = random.random() < 0.45, h - 0.04, -d / 2 + 0.06
     parts = [box((-w / 2, y, 0.08), (w / 2, d / 2, z), enamel), box((-w / 2, y + 0.04, 0), (w / 2, d / 2, 0.08), DARK)]
@@ -128,9 +123,9 @@ def _worktop(random: Random) -> Material:
     return Material(color, texture, darker(color, 0.78), scale_m, int(random.integers(99)), gloss)
 
 
-def kitchen_counter(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def kitchen_counter(random: Random, wanted: WantedSize) -> Item:
     """A row of base units: plinth, doors and one stack of drawers under a worktop that is free."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.6, 2.0), (0.58, 0.64), (0.87, 0.92))
+    w, d, h = wanted.fill(random, (0.6, 2.0), (0.58, 0.64), (0.87, 0.92), always_draw=True)
     thick, y = float(random.uniform(0.025, 0.045)), -d / 2 + 0.04
     word, parts = fronts(random, w, y, 0.1, h - thick)
     parts.append(box((-w / 2, y, 0.1), (w / 2, d / 2, h - thick), Material(darker(parts[0].material.color, 0.6))))
@@ -140,12 +135,11 @@ def kitchen_counter(random: Random, *, width_m: Length = None, depth_m: Length =
     return fitted("kitchen counter", parts, (w, d, h), word, (top,))
 
 
-def sink(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def sink(random: Random, wanted: WantedSize) -> Item:
     """A kitchen unit with a basin and a tap (when asked for 0.55 m depth or more), or a washbasin (for less)."""
-    asked = (width_m, depth_m, height_m)
-    if random.random() < 0.5 if depth_m is None else depth_m >= 0.55:
-        return _kitchen_sink(random, *sizes(random, asked, (0.6, 1.1), (0.58, 0.64), (1.08, 1.18)))
-    return washbasin(random, *sizes(random, asked, (0.45, 0.7), (0.38, 0.5), (0.88, 1.02)))
+    if random.random() < 0.5 if wanted.depth_m is None else wanted.depth_m >= 0.55:
+        return _kitchen_sink(random, *wanted.fill(random, (0.6, 1.1), (0.58, 0.64), (1.08, 1.18), always_draw=True))
+    return washbasin(random, *wanted.fill(random, (0.45, 0.7), (0.38, 0.5), (0.88, 1.02), always_draw=True))
 
 
 def _kitchen_sink(random: Random, w: float, d: float, h: float) -> Item:
@@ -172,6 +166,6 @@ def _kitchen_sink(random: Random, w: float, d: float, h: float) -> Item:
     return fitted("sink", parts, (w, d, h), word)
 
 
-DESIGNS: dict[str, Design] = {
+DESIGNS = {
     "refrigerator": refrigerator, "stove": stove, "sink": sink, "kitchen counter": kitchen_counter,
 }  # fmt: skip

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
 from placegraph.tools.simulator.catalogue._appliance_parts import knob, molded
-from placegraph.tools.simulator.catalogue._item_assembly import fitted, sizes
-from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL, Length, Random
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, fitted
+from placegraph.tools.simulator.catalogue._materials import DARK, GLASS, STEEL
 from placegraph.tools.simulator.catalogue.kitchen import DISPLAY, enamel_finish
 from placegraph.tools.simulator.color_palette import darker, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part
@@ -24,9 +23,9 @@ from placegraph.tools.simulator.mesh_primitives import (
 )
 
 
-def microwave(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def microwave(random: Random, wanted: WantedSize) -> Item:
     """A low box: dark window on the left, and on the right a display with keys, or two dials."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.44, 0.54), (0.32, 0.42), (0.26, 0.31))
+    w, d, h = wanted.fill(random, (0.44, 0.54), (0.32, 0.42), (0.26, 0.31), always_draw=True)
     word, enamel = enamel_finish(random)
     y, split = -d / 2 + 0.03, w * 0.24
     parts = [box((-w / 2, y, 0.012), (w / 2, d / 2, h), enamel)]
@@ -48,9 +47,9 @@ def microwave(random: Random, *, width_m: Length = None, depth_m: Length = None,
     return fitted("microwave", parts, (w, d, h), word)
 
 
-def kettle(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def kettle(random: Random, wanted: WantedSize) -> Item:
     """An electric jug on its base, or a round kettle with a long spout and a bow over the lid."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.21, 0.26), (0.15, 0.18), (0.2, 0.27))
+    w, d, h = wanted.fill(random, (0.21, 0.26), (0.15, 0.18), (0.2, 0.27), always_draw=True)
     word, color = pick(random, ("gray", "gray", "white", "black", "red", "blue", "green", "beige"))
     body = Material(color, gloss=0.7)
     r = d / 2
@@ -70,9 +69,9 @@ def kettle(random: Random, *, width_m: Length = None, depth_m: Length = None, he
     return fitted("kettle", [*parts, ellipsoid((0, 0, h * 0.61), (0.016, 0.016, h * 0.05), DARK, 8)], (w, d, h), word)
 
 
-def toaster(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def toaster(random: Random, wanted: WantedSize) -> Item:
     """A rounded box with slots on top, a lever and a dial, at times with bread that looks out."""
-    w, d, h = sizes(random, (width_m, depth_m, height_m), (0.26, 0.38), (0.16, 0.2), (0.18, 0.22))
+    w, d, h = wanted.fill(random, (0.26, 0.38), (0.16, 0.2), (0.18, 0.22), always_draw=True)
     word, color = pick(random, ("gray", "gray", "white", "black", "red", "green", "blue", "beige"))
     bread = random.random() < 0.5
     top = h * 0.84 if bread else h - 0.002
@@ -92,11 +91,11 @@ def toaster(random: Random, *, width_m: Length = None, depth_m: Length = None, h
     return fitted("toaster", parts, (w, d, h), word)
 
 
-def coffee_machine(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def coffee_machine(random: Random, wanted: WantedSize) -> Item:
     """A filter machine with a glass jug, an espresso box with a portafilter, or a slim capsule machine."""
     kind = int(random.integers(3))
     wide = ((0.2, 0.26), (0.24, 0.32), (0.14, 0.18))[kind]
-    w, d, h = sizes(random, (width_m, depth_m, height_m), wide, (0.26, 0.34), (0.3, 0.38))
+    w, d, h = wanted.fill(random, wide, (0.26, 0.34), (0.3, 0.38), always_draw=True)
     word, color = pick(random, ("black", "black", "gray", "gray", "white", "red"))
     body = Material(color, gloss=0.5)
     parts = (_filter_machine, _espresso_machine, _capsule_machine)[kind](w, d, h, body)
@@ -150,6 +149,6 @@ def _capsule_machine(w: float, d: float, h: float, body: Material) -> list[Part]
     return [*parts, cylinder((0, -d * 0.32, 0.032), 0.026, 0.065, Material((240, 238, 232), gloss=0.4), 0.036, 10)]
 
 
-DESIGNS: dict[str, Design] = {
+DESIGNS = {
     "microwave": microwave, "kettle": kettle, "toaster": toaster, "coffee machine": coffee_machine,
 }  # fmt: skip

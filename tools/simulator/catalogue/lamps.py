@@ -6,38 +6,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._item_assembly import fitted, sizes
-from placegraph.tools.simulator.catalogue._materials import Length, Random
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, fitted
 from placegraph.tools.simulator.color_palette import METALS, VIVID, WOODS, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import (
-    Point,
-    block,
-    cylinder,
-    ellipsoid,
-    lathe,
-    moved,
-    tube,
-    turned,
-)
+from placegraph.tools.simulator.mesh_primitives import Point, block, cylinder, ellipsoid, lathe, moved, tube, turned
 
 BULB = Material((255, 244, 214), glow=1.0)
 SHADES = ("white", "white", "beige", "beige", "yellow", "orange", "red", "green", "blue", "gray", "pink")
 
 
-def lamp(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def lamp(random: Random, wanted: WantedSize) -> Item:
     """A table lamp when a height below 0.8 m is asked for, a floor lamp when more is, either when none is."""
-    table = random.random() < 0.45 if height_m is None else height_m < 0.8
+    table = random.random() < 0.45 if wanted.height_m is None else wanted.height_m < 0.8
     word, color = pick(random, SHADES)
     shade = _shade(random, color)
     metal = Material(pick(random, tuple(METALS), METALS)[1], gloss=0.6)
     wide, high = ((0.22, 0.34), (0.35, 0.6)) if table else ((0.32, 0.48), (1.35, 1.75))
-    w, _, h = sizes(random, (width_m, depth_m, height_m), wide, wide, high)
+    w, _, h = wanted.fill(random, wide, wide, high, always_draw=True)
     designs = (_vase_lamp, _bent_lamp, _mushroom_lamp) if table else (_pole_lamp, _tripod_lamp, _arc_lamp)
-    choices = 3 if table or width_m is None or width_m > 0.6 else 2  # the bow needs room
+    choices = 3 if table or wanted.width_m is None or wanted.width_m > 0.6 else 2  # the bow needs room
     parts = designs[int(random.integers(choices))](random, w, h, shade, metal)
-    return fitted("lamp", parts, (width_m, depth_m, height_m), word)
+    return fitted("lamp", parts, wanted, word)
 
 
 def _shade(random: Random, color: Color) -> Material:
@@ -135,14 +124,14 @@ def _arc_lamp(random: Random, w: float, h: float, shade: Material, metal: Materi
     return [foot, tube([(-reach / 2, 0, 0.04), *bow], 0.013, metal, 6), moved(dome, (x, 0, z - 0.14)), light]
 
 
-def ceiling_lamp(random: Random, *, width_m: Length = None, depth_m: Length = None, height_m: Length = None) -> Item:
+def ceiling_lamp(random: Random, wanted: WantedSize) -> Item:
     """A lamp below a ceiling, whose top is the ceiling's point; flat against it when under 0.25 m high is asked for."""
-    flat = random.random() < 0.3 if height_m is None else height_m < 0.25
+    flat = random.random() < 0.3 if wanted.height_m is None else wanted.height_m < 0.25
     word, color = pick(random, SHADES)
     shade = _shade(random, color)
     wide, high = (0.3, 0.5), (0.1, 0.17) if flat else (0.5, 0.95)
-    w, d, h = sizes(random, (width_m, depth_m, height_m), wide, wide, high)
-    if depth_m is None:
+    w, d, h = wanted.fill(random, wide, wide, high, always_draw=True)
+    if wanted.depth_m is None:
         d = w  # round, unless a depth is asked for
     metal = Material(pick(random, tuple(METALS), METALS)[1], gloss=0.6)
     if flat:
@@ -221,4 +210,4 @@ def _chandelier_parts(random: Random, w: float, h: float, shade: Material, metal
     return parts
 
 
-DESIGNS: dict[str, Design] = {"lamp": lamp, "ceiling lamp": ceiling_lamp}
+DESIGNS = {"lamp": lamp, "ceiling lamp": ceiling_lamp}

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.runtime.arrays import F64
-from placegraph.tools.simulator.catalogue import Design
 from placegraph.tools.simulator.catalogue._item_assembly import (
+    Random,
+    WantedSize,
     arc,
     chance,
     drawn,
@@ -31,7 +32,7 @@ _POCKET: tuple[_Level, ...] = (
 _FLAP: tuple[_Level, ...] = ((0.74, 0.48, -0.42, 0.3), (0.86, 0.48, -0.38, 0.3), (0.97, 0.36, -0.16, 0.26))
 
 
-def _trolley(random: np.random.Generator, width_m: float, depth_m: float, height_m: float) -> tuple[str, list[Part]]:
+def _trolley(random: Random, width_m: float, depth_m: float, height_m: float) -> tuple[str, list[Part]]:
     """A hard shell with ribs, four wheels and a pulled-out handle."""
     name, color = pick(random, (*VIVID, "black", "gray", "white"))
     shell, trim = Material(color, gloss=0.5), Material((34, 34, 36), gloss=0.3)
@@ -68,7 +69,7 @@ def _trolley(random: np.random.Generator, width_m: float, depth_m: float, height
     return name, parts
 
 
-def _leather(random: np.random.Generator, width_m: float, depth_m: float, height_m: float) -> tuple[str, list[Part]]:
+def _leather(random: Random, width_m: float, depth_m: float, height_m: float) -> tuple[str, list[Part]]:
     """An old suitcase standing on its long side: corners, two belts, two locks and a handle on top."""
     name, color = pick(random, ("brown", "brown", "beige", "red", "green", "blue", "black"))
     hide = Material(color, "noise", darker(color, 0.85), 0.04, gloss=0.2)
@@ -90,18 +91,11 @@ def _leather(random: np.random.Generator, width_m: float, depth_m: float, height
     return name, parts
 
 
-def suitcase(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def suitcase(random: Random, wanted: WantedSize) -> Item:
     """An upright trolley case, or an old suitcase of leather on its long side."""
     trolley = chance(random, 0.6)
-    width = drawn(random, width_m, *((0.36, 0.48) if trolley else (0.55, 0.75)))
-    depth = drawn(random, depth_m, *((0.22, 0.3) if trolley else (0.16, 0.22)))
-    height = drawn(random, height_m, *((0.62, 0.95) if trolley else (0.42, 0.52)))
+    ranges = ((0.36, 0.48), (0.22, 0.3), (0.62, 0.95)) if trolley else ((0.55, 0.75), (0.16, 0.22), (0.42, 0.52))
+    width, depth, height = wanted.fill(random, *ranges)
     name, parts = (_trolley if trolley else _leather)(random, width, depth, height)
     return fitted("suitcase", parts, (width, depth, height), name)
 
@@ -127,13 +121,7 @@ def _straps(second: Material) -> list[Part]:
     return [*parts, tube(arc((0, 0.16, 0.92), (0.1, 0.08), np.pi, 0, 4), 0.02, black, sides=4)]
 
 
-def backpack(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def backpack(random: Random, wanted: WantedSize) -> Item:
     """A round-topped sack with a pocket, zips, side nets, two shoulder straps and a loop; or a hiker's with a flap."""
     name, color = pick(random, (*VIVID, "black", "gray", "blue"))
     cloth = Material(color, "fabric", darker(color, 0.85), 0.03)
@@ -157,8 +145,8 @@ def backpack(
         line = [(-x, y, z) for x, y, z in right[::-1]] + right
         parts.append(tube(line, 0.014, black, sides=4))
     parts += _straps(second)
-    width, depth = drawn(random, width_m, 0.28, 0.36), drawn(random, depth_m, 0.2, 0.28)
-    return fitted("backpack", parts, (width, depth, drawn(random, height_m, 0.42, 0.55)), name)
+    width, depth = drawn(random, wanted.width_m, 0.28, 0.36), drawn(random, wanted.depth_m, 0.2, 0.28)
+    return fitted("backpack", parts, (width, depth, drawn(random, wanted.height_m, 0.42, 0.55)), name)
 
 
-DESIGNS: dict[str, Design] = {"suitcase": suitcase, "backpack": backpack}
+DESIGNS = {"suitcase": suitcase, "backpack": backpack}

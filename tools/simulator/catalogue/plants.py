@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._item_assembly import chance, drawn, fitted, loft, merged
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, chance, drawn, fitted, loft, merged
 from placegraph.tools.simulator.color_palette import COLORS, VIVID, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
 from placegraph.tools.simulator.mesh_primitives import Point, block, cylinder, ellipsoid, lathe, moved, tube
@@ -39,7 +38,7 @@ def blade(
     return loft(np.array(rings), material)
 
 
-def _pot(random: np.random.Generator, radius_m: float, height_m: float) -> list[Part]:
+def _pot(random: Random, radius_m: float, height_m: float) -> list[Part]:
     kind = int(random.integers(4))
     if kind == 0:
         clay = Material(jitter(_TERRACOTTA, random), "noise", darker(_TERRACOTTA, 0.85), 0.1)
@@ -60,7 +59,7 @@ def _pot(random: np.random.Generator, radius_m: float, height_m: float) -> list[
     return [*pot, cylinder((0, 0, height_m), radius_m * 0.8, 0.008, _SOIL, sides=12)]
 
 
-def _sword_leaves(random: np.random.Generator, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
+def _sword_leaves(random: Random, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
     leaves = []
     for k in range(int(random.integers(7, 10) if tall_m < 0.35 else random.integers(9, 14))):
         yaw, out = random.uniform(0, 2 * np.pi), tall_m * 0.06
@@ -70,7 +69,7 @@ def _sword_leaves(random: np.random.Generator, greens: list[Material], base_m: f
     return leaves
 
 
-def _palm_leaves(random: np.random.Generator, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
+def _palm_leaves(random: Random, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
     leaves, count = [], int(random.integers(10, 13) if tall_m < 0.35 else random.integers(16, 24))
     for k in range(count):
         yaw = 2.4 * k + random.uniform(-0.3, 0.3)
@@ -81,7 +80,7 @@ def _palm_leaves(random: np.random.Generator, greens: list[Material], base_m: fl
     return leaves
 
 
-def _broad_leaves(random: np.random.Generator, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
+def _broad_leaves(random: Random, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
     bark = Material((92, 104, 52))
     parts = [tube([(0, 0, base_m), (0.02 * tall_m, 0, base_m + 0.92 * tall_m)], 0.018 * tall_m, bark, sides=5)]
     for k in range(int(random.integers(9, 12) if tall_m < 0.35 else random.integers(14, 20))):
@@ -92,7 +91,7 @@ def _broad_leaves(random: np.random.Generator, greens: list[Material], base_m: f
     return parts
 
 
-def _crown(random: np.random.Generator, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
+def _crown(random: Random, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
     bark = Material((96, 70, 48), "noise", (70, 50, 34), 0.05)
     trunk = tall_m * random.uniform(0.3, 0.6)
     parts = [tube([(0, 0, base_m), (0, 0, base_m + trunk)], 0.025 * tall_m + 0.004, bark, sides=6)]
@@ -107,7 +106,7 @@ def _crown(random: np.random.Generator, greens: list[Material], base_m: float, t
     return parts
 
 
-def _cactus(random: np.random.Generator, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
+def _cactus(random: Random, greens: list[Material], base_m: float, tall_m: float) -> list[Part]:
     skin = Material(greens[0].color, "stripes", darker(greens[0].color, 1.35), 0.03)
     thick = tall_m * float(random.uniform(0.13, 0.2))
     parts = [ellipsoid((0, 0, base_m + tall_m * 0.48), (thick, thick, tall_m * 0.52), skin, sides=10)]
@@ -120,16 +119,10 @@ def _cactus(random: np.random.Generator, greens: list[Material], base_m: float, 
     return [*parts, ellipsoid((0, 0, base_m + tall_m), (thick * 0.4, thick * 0.4, thick * 0.3), bloom, sides=6)]
 
 
-def potted_plant(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def potted_plant(random: Random, wanted: WantedSize) -> Item:
     """A plant in its pot: swords, palm, broad leaves or a small tree, for small ones also a cactus."""
     sill = chance(random, 0.45)
-    height = drawn(random, height_m, *((0.22, 0.45) if sill else (0.7, 1.4)))
+    height = drawn(random, wanted.height_m, *((0.22, 0.45) if sill else (0.7, 1.4)))
     pot = height * float(random.uniform(0.3, 0.42) if height < 0.5 else random.uniform(0.2, 0.32))
     colors = [jitter(_GREENS[int(k)], random) for k in random.permutation(len(_GREENS))[:2]]
     greens = [Material(color, "leaves", darker(color, 0.6), max(0.06, height * 0.12)) for color in colors]
@@ -141,10 +134,10 @@ def potted_plant(
     foliage = [merged(group) for material in greens if (group := [p for p in parts if p.material is material])]
     stems = [part for part in parts if part.material not in greens]
     potted = [*_pot(random, pot * float(random.uniform(0.5, 0.65)), pot), *stems, *foliage]
-    return fitted("potted plant", potted, (width_m, depth_m, height), "green")
+    return fitted("potted plant", potted, (wanted.width_m, wanted.depth_m, height), "green")
 
 
-def _flowers(random: np.random.Generator, mouth_m: float, reach_m: float) -> list[Part]:
+def _flowers(random: Random, mouth_m: float, reach_m: float) -> list[Part]:
     stems, leaves, petals, hearts = [], [], [], []
     _, color = pick(random, ("red", "orange", "yellow", "purple", "pink", "white"))
     stalk, petal, heart = Material((70, 116, 54)), Material(color), Material(jitter(COLORS["yellow"], random))
@@ -162,15 +155,9 @@ def _flowers(random: np.random.Generator, mouth_m: float, reach_m: float) -> lis
     return [merged(group) for group in (stems + leaves, petals, hearts)]
 
 
-def vase(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def vase(random: Random, wanted: WantedSize) -> Item:
     """A vase of one of five outlines, plain, striped or marbled, in most cases with flowers."""
-    height = drawn(random, height_m, 0.2, 0.5)
+    height = drawn(random, wanted.height_m, 0.2, 0.5)
     full = chance(random, 0.55)
     body = height * (0.55 if full else 1.0)
     profile = _VASES[int(random.integers(len(_VASES)))]
@@ -187,7 +174,7 @@ def vase(
     ]
     if full:
         parts += _flowers(random, body, height - body)
-    return fitted("vase", parts, (width_m, depth_m, height), name)
+    return fitted("vase", parts, (wanted.width_m, wanted.depth_m, height), name)
 
 
-DESIGNS: dict[str, Design] = {"potted plant": potted_plant, "vase": vase}
+DESIGNS = {"potted plant": potted_plant, "vase": vase}

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.random import Generator
 
 from placegraph.tools.simulator.catalogue._cabinet_parts import finish, metal, wood
-from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled, drawn, loft
 from placegraph.tools.simulator.catalogue._upholstery import cloth, cushion, leaned, legs, upholstered
-from placegraph.tools.simulator.catalogue.tables import Size
 from placegraph.tools.simulator.color_palette import darker
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
 from placegraph.tools.simulator.mesh_primitives import box, cylinder, lathe, moved, tube, turned
@@ -32,10 +30,9 @@ def _chair_back(style: str, w: float, y: float, z0: float, z1: float, frame: Mat
     return [*stays, box((-w / 2, y - 0.02, z0 + 0.08), (w / 2, y + 0.02, z1), frame)]
 
 
-def chair(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def chair(random: Random, wanted: WantedSize) -> Item:
     """A dining chair: slatted, ladder, solid or padded back on four straight, splayed or crossed legs."""
-    w, d = drawn(random, width_m, 0.4, 0.5), drawn(random, depth_m, 0.46, 0.55)
-    h = drawn(random, height_m, 0.82, 1.02)
+    w, d, h = wanted.fill(random, (0.4, 0.5), (0.46, 0.55), (0.82, 1.02))
     seat, lean = min(0.47, 0.52 * h), float(random.uniform(0.04, 0.08))
     name, frame = finish(random, 0.35)
     style = str(random.choice(["slats", "ladder", "solid", "pad"]))
@@ -70,10 +67,9 @@ def chair(random: Generator, *, width_m: Size = None, depth_m: Size = None, heig
     return assembled("chair", parts, (w, d, h), name)
 
 
-def sofa(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def sofa(random: Random, wanted: WantedSize) -> Item:
     """A seat for two or three with block, rolled or slim arms, loose cushions and at times throw pillows."""
-    w, d = drawn(random, width_m, 1.45, 2.25), drawn(random, depth_m, 0.82, 0.98)
-    h = drawn(random, height_m, 0.76, 0.92)
+    w, d, h = wanted.fill(random, (1.45, 2.25), (0.82, 0.98), (0.76, 0.92))
     name, cover = cloth(
         random, ("gray", "beige", "brown", "blue", "green", "red", "black", "white", "yellow", "orange")
     )
@@ -86,11 +82,10 @@ def sofa(random: Generator, *, width_m: Size = None, depth_m: Size = None, heigh
     return assembled("sofa", parts, (w, d, h), name)
 
 
-def armchair(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def armchair(random: Random, wanted: WantedSize) -> Item:
     """A soft chair for one: upholstered all over, a wooden frame with cushions, or a round tub."""
     style = str(random.choice(["upholstered", "frame", "tub"]))
-    w, d = drawn(random, width_m, 0.68, 0.92), drawn(random, depth_m, 0.72, 0.9)
-    h = drawn(random, height_m, 0.78, 1.02)
+    w, d, h = wanted.fill(random, (0.68, 0.92), (0.72, 0.9), (0.78, 1.02))
     name, cover = cloth(random)
     if style == "upholstered":
         return assembled("armchair", upholstered(random, w, d, h, 1, cover), (w, d, h), name)
@@ -121,26 +116,20 @@ def _tub(w: float, d: float, h: float, cover: Material, leg: Material) -> list[P
         top = h - (h - min(0.6, 0.75 * h)) * (1 - max(0.0, float(np.sin(a)))) ** 0.7
         for share, z in ((0.78, foot), (0.86, top), (1.0, top), (0.9, foot)):
             rings.append((share * w / 2 * np.cos(a), share * d / 2 * np.sin(a), z))
-    faces = []
-    for i in range(sides - 1):
-        for k in range(4):
-            a, b = 4 * i + k, 4 * i + (k + 1) % 4
-            faces += [(a, b, b + 4), (a, b + 4, a + 4)]
-    last = 4 * (sides - 1)
-    faces += [(0, 2, 1), (0, 3, 2), (last, last + 1, last + 2), (last, last + 2, last + 3)]
-    shell = np.array(rings)
-    shell[:, 0] *= w / np.ptp(shell[:, 0])
+    points = np.array(rings)
+    points[:, 0] *= w / np.ptp(points[:, 0])
+    shell = loft(points.reshape(sides, 4, 3), cover)
     pad = lathe([(0, foot), (0.82, foot), (0.88, seat - 0.05), (0.8, seat), (0, seat)], cover)
     front = -d / 2 - float(pad.vertices[:, 1].min()) * d / 2
     pad = Part(pad.vertices * (w / 2, d / 2, 1) + (0, front, 0), pad.faces, cover)
-    return [*legs(0.6 * w, 0.6 * d, foot + 0.02, 0.035, leg), Part(shell, np.array(faces, np.int32), cover), pad]
+    return [*legs(0.6 * w, 0.6 * d, foot + 0.02, 0.035, leg), shell, pad]
 
 
-def office_chair(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def office_chair(random: Random, wanted: WantedSize) -> Item:
     """A swivel chair: five feet on castors, a gas spring, seat, arms, and a padded, mesh or high back."""
-    w, d = drawn(random, width_m, 0.58, 0.68), drawn(random, depth_m, 0.58, 0.68)
+    w, d = drawn(random, wanted.width_m, 0.58, 0.68), drawn(random, wanted.depth_m, 0.58, 0.68)
     style = str(random.choice(["padded", "mesh", "high"]))
-    h = drawn(random, height_m, *((1.12, 1.25) if style == "high" else (0.92, 1.08)))
+    h = drawn(random, wanted.height_m, *((1.12, 1.25) if style == "high" else (0.92, 1.08)))
     name, cover = cloth(random, ("black", "black", "gray", "blue", "red", "white", "green", "orange"))
     frame = Material((38, 38, 42), gloss=0.3) if random.random() < 0.7 else metal(random)
     seat, r = min(0.5, 0.5 * h), 0.46 * min(w, d)
@@ -170,14 +159,14 @@ def office_chair(random: Generator, *, width_m: Size = None, depth_m: Size = Non
     return assembled("office chair", parts + leaned(back, seat, h, lean), (w, d, h), name)
 
 
-def stool(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def stool(random: Random, wanted: WantedSize) -> Item:
     """A seat without a back: three-legged, a bar stool with a foot rail, one on a column, or a soft footstool."""
     style = str(random.choice(["three legs", "bar", "column", "soft"]))
-    if height_m is not None and (style == "soft") != (height_m < 0.38):
-        style = "soft" if height_m < 0.38 else "bar"
+    if wanted.height_m is not None and (style == "soft") != (wanted.height_m < 0.38):
+        style = "soft" if wanted.height_m < 0.38 else "bar"
     low, high = {"three legs": (0.42, 0.5), "bar": (0.62, 0.78), "column": (0.6, 0.8), "soft": (0.35, 0.45)}[style]
-    w = drawn(random, width_m, *((0.4, 0.6) if style == "soft" else (0.33, 0.42)))
-    d, h = drawn(random, depth_m, 0.95 * w, 1.05 * w), drawn(random, height_m, low, high)
+    w = drawn(random, wanted.width_m, *((0.4, 0.6) if style == "soft" else (0.33, 0.42)))
+    d, h = drawn(random, wanted.depth_m, 0.95 * w, 1.05 * w), drawn(random, wanted.height_m, low, high)
     wood_name, frame = finish(random, 0.3)
     name, cover = cloth(random)
     if style == "soft":
@@ -216,13 +205,13 @@ def _flattened(part: Part, w: float, d: float) -> Part:
     return Part(part.vertices * np.array([w, d, 1.0]), part.faces, part.material)
 
 
-def bench(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def bench(random: Random, wanted: WantedSize) -> Item:
     """A long seat: a plain board on legs, one with a slatted back, or a padded one above a shoe shelf."""
     style = str(random.choice(["plain", "back", "padded"]))
-    if height_m is not None:
-        style = "back" if height_m > 0.62 else ("plain" if style == "back" else style)
-    w, d = drawn(random, width_m, 0.95, 1.5), drawn(random, depth_m, *((0.42, 0.5) if style == "back" else (0.32, 0.4)))
-    h = drawn(random, height_m, *((0.8, 0.92) if style == "back" else (0.42, 0.48)))
+    if wanted.height_m is not None:
+        style = "back" if wanted.height_m > 0.62 else ("plain" if style == "back" else style)
+    deep, high = ((0.42, 0.5), (0.8, 0.92)) if style == "back" else ((0.32, 0.4), (0.42, 0.48))
+    w, d, h = wanted.fill(random, (0.95, 1.5), deep, high)
     name, frame = wood(random)
     seat = 0.45 if style == "back" else h
     if style == "padded":

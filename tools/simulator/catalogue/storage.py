@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.random import Generator
 
 from placegraph.tools.simulator.catalogue._cabinet_parts import (
     Fronts,
@@ -17,17 +16,15 @@ from placegraph.tools.simulator.catalogue._cabinet_parts import (
     standing,
     wood,
 )
-from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
-from placegraph.tools.simulator.catalogue.tables import Size
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled
 from placegraph.tools.simulator.color_palette import MUTED, VIVID, darker, pick
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
 from placegraph.tools.simulator.mesh_primitives import box, cylinder, ellipsoid, moved, tube
 
 
-def wardrobe(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def wardrobe(random: Random, wanted: WantedSize) -> Item:
     """A tall case with two to four doors, some with a mirror door, drawers below, or sliding doors."""
-    w, d = drawn(random, width_m, 0.9, 1.9), drawn(random, depth_m, 0.52, 0.65)
-    h = drawn(random, height_m, 1.8, 2.15)
+    w, d, h = wanted.fill(random, (0.9, 1.9), (0.52, 0.65), (1.8, 2.15))
     name, body = finish(random, 0.15)
     fronts = Fronts(
         body if random.random() < 0.7 else wood(random)[1], metal(random), "bar" if random.random() < 0.6 else "knob"
@@ -59,9 +56,7 @@ def _moulding(x0: float, x1: float, z0: float, z1: float, y: float, panel: Mater
     return box((x0, y - 0.006, z0), (x1, y, z1), Material(darker(panel.color, 0.85), gloss=panel.gloss))
 
 
-def _books(
-    random: Generator, x0: float, x1: float, y: float, d: float, z: float, gap: float
-) -> tuple[list[Part], float]:
+def _books(random: Random, x0: float, x1: float, y: float, d: float, z: float, gap: float) -> tuple[list[Part], float]:
     """A row of books on a board from x0 toward x1: the blocks and where the row ends."""
     end = x0 + (x1 - x0) * (1.0 if random.random() < 0.5 else float(random.uniform(0.45, 0.75)))
     cuts = [x0 + 0.005, end - 0.005]
@@ -76,11 +71,10 @@ def _books(
     return rows, end
 
 
-def bookshelf(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def bookshelf(random: Random, wanted: WantedSize) -> Item:
     """Boards between sides, partly filled with books: a case with a back, cubes, or an open frame of metal posts."""
     style = str(random.choice(["case", "cubes", "open"]))
-    w, d = drawn(random, width_m, 0.6, 1.15), drawn(random, depth_m, 0.25, 0.36)
-    h = drawn(random, height_m, 0.9 if style == "cubes" else 1.3, 1.5 if style == "cubes" else 2.05)
+    w, d, h = wanted.fill(random, (0.6, 1.15), (0.25, 0.36), (0.9, 1.5) if style == "cubes" else (1.3, 2.05))
     name, board = finish(random, 0.15)
     t = float(random.uniform(0.02, 0.03))
     side = t if style != "open" else 0.025
@@ -110,12 +104,11 @@ def bookshelf(random: Generator, *, width_m: Size = None, depth_m: Size = None, 
     return assembled("bookshelf", parts, (w, d, h), name, surfaces)
 
 
-def dresser(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def dresser(random: Random, wanted: WantedSize) -> Item:
     """A chest full of drawers: low and wide, tall and narrow, or with small drawers on top."""
     style = str(random.choice(["wide", "tall", "small top"]))
     tall = style == "tall"
-    w, d = drawn(random, width_m, *((0.5, 0.7) if tall else (0.9, 1.5))), drawn(random, depth_m, 0.4, 0.5)
-    h = drawn(random, height_m, *((1.05, 1.3) if tall else (0.75, 0.95)))
+    w, d, h = wanted.fill(random, (0.5, 0.7) if tall else (0.9, 1.5), (0.4, 0.5), (1.05, 1.3) if tall else (0.75, 0.95))
     name, body = finish(random)
     fronts = fronts_of(random, body)
     base, z0 = standing(random, w, d, h, body)
@@ -134,11 +127,10 @@ def dresser(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
     )
 
 
-def cabinet(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def cabinet(random: Random, wanted: WantedSize) -> Item:
     """A sideboard: doors alone, doors under a row of drawers, or doors left and right of open boards."""
     style = str(random.choice(["doors", "drawers above", "open middle"]))
-    w, d = drawn(random, width_m, 0.8, 1.7), drawn(random, depth_m, 0.36, 0.46)
-    h = drawn(random, height_m, 0.6, 0.95)
+    w, d, h = wanted.fill(random, (0.8, 1.7), (0.36, 0.46), (0.6, 0.95))
     name, body = finish(random)
     fronts = fronts_of(random, body)
     base, z0 = standing(random, w, d, h, body)
@@ -168,7 +160,7 @@ def cabinet(random: Generator, *, width_m: Size = None, depth_m: Size = None, he
     return assembled("cabinet", parts, (w, d, h), name, surfaces)
 
 
-def _pair_of_shoes(random: Generator, x: float, y: float, z: float, length: float) -> list[Part]:
+def _pair_of_shoes(random: Random, x: float, y: float, z: float, length: float) -> list[Part]:
     color = pick(random, MUTED + VIVID)[1]
     sole = Material((225, 222, 214) if random.random() < 0.5 else darker(color, 0.5))
     upper = Material(color, "fabric", darker(color, 0.8), 0.05)
@@ -180,10 +172,9 @@ def _pair_of_shoes(random: Generator, x: float, y: float, z: float, length: floa
     return parts
 
 
-def shoe_rack(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def shoe_rack(random: Random, wanted: WantedSize) -> Item:
     """A few low boards or rails between two ends, with shoes on them."""
-    w, d = drawn(random, width_m, 0.55, 0.95), drawn(random, depth_m, 0.28, 0.34)
-    h = drawn(random, height_m, 0.42, 0.75)
+    w, d, h = wanted.fill(random, (0.55, 0.95), (0.28, 0.34), (0.42, 0.75))
     name, board = wood(random)
     rails, levels = random.random() < 0.5, 2 if h < 0.6 else 3
     parts = [box((x, -d / 2, 0), (x + 0.022, d / 2, h), board) for x in (-w / 2, w / 2 - 0.022)]
@@ -210,7 +201,7 @@ def shoe_rack(random: Generator, *, width_m: Size = None, depth_m: Size = None, 
     )
 
 
-def _coat(random: Generator, x: float, y: float, top: float, length: float, half: tuple[float, float]) -> Part:
+def _coat(random: Random, x: float, y: float, top: float, length: float, half: tuple[float, float]) -> Part:
     color = pick(random, VIVID + MUTED)[1]
     cloth = Material(color, "fabric", darker(color, 0.8), 0.08, int(random.integers(1000)))
     part = cylinder((0, 0, top - length), 1.0, length * 0.8, cloth, top_radius_m=0.85, sides=8)
@@ -219,11 +210,11 @@ def _coat(random: Generator, x: float, y: float, top: float, length: float, half
     return Part(vertices, np.concatenate((part.faces, shoulders.faces + len(part.vertices))), cloth)
 
 
-def coat_rack(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def coat_rack(random: Random, wanted: WantedSize) -> Item:
     """A pole with pegs on crossed feet, or a rail on two posts; both with coats, the pole at times with a hat."""
-    pole = random.random() < 0.6 if width_m is None else width_m < 0.7
-    w, d = drawn(random, width_m, *((0.42, 0.6) if pole else (0.8, 1.2))), drawn(random, depth_m, 0.42, 0.55)
-    h = drawn(random, height_m, *((1.65, 1.85) if pole else (1.4, 1.65)))
+    pole = random.random() < 0.6 if wanted.width_m is None else wanted.width_m < 0.7
+    wide, high = ((0.42, 0.6), (1.65, 1.85)) if pole else ((0.8, 1.2), (1.4, 1.65))
+    w, d, h = wanted.fill(random, wide, (0.42, 0.55), high)
     name, stuff = wood(random)
     if not pole:
         bar = metal(random)

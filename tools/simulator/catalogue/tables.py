@@ -5,25 +5,16 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.random import Generator
 
-from placegraph.tools.simulator.catalogue._cabinet_parts import (
-    case,
-    dark_of,
-    finish,
-    fronts_of,
-    metal,
-    standing,
-    wood,
-)
-from placegraph.tools.simulator.catalogue._item_assembly import assembled, drawn
+from placegraph.tools.simulator.catalogue._cabinet_parts import case, dark_of, finish, fronts_of, metal, standing, wood
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, assembled, drawn
 from placegraph.tools.simulator.house_model import Item, Material, Part, SupportSurface
 from placegraph.tools.simulator.mesh_primitives import block, box, extrude, lathe, moved, tube
 
 Size = float | None
 
 
-def _table_top(random: Generator, w: float, d: float, z0: float, h: float, stuff: Material, round_it: bool) -> Part:
+def _table_top(random: Random, w: float, d: float, z0: float, h: float, stuff: Material, round_it: bool) -> Part:
     """A table top, w by d, round or with corners."""
     if not round_it:
         return box((-w / 2, -d / 2, z0), (w / 2, d / 2, h), stuff)
@@ -66,12 +57,12 @@ def _table_legs(style: str, w: float, d: float, high: float, stuff: Material, th
     return [block((x, y, 0), (thick, thick, high), stuff) for x, y in corners] + rails
 
 
-def table(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def table(random: Random, wanted: WantedSize) -> Item:
     """A dining table from small and round to long: on legs, a column, trestles or panels."""
     shape = str(random.choice(["round", "long", "long", "square"]))
-    w = drawn(random, width_m, *((1.3, 2.0) if shape == "long" else (0.75, 1.1)))
-    d = drawn(random, depth_m, *((0.8, 0.95) if shape == "long" else (w, w)))
-    h = drawn(random, height_m, 0.72, 0.77)
+    w = drawn(random, wanted.width_m, *((1.3, 2.0) if shape == "long" else (0.75, 1.1)))
+    d = drawn(random, wanted.depth_m, *((0.8, 0.95) if shape == "long" else (w, w)))
+    h = drawn(random, wanted.height_m, 0.72, 0.77)
     round_it = shape == "round" and 0.6 < w / d < 1.7
     name, top = finish(random, 0.12)
     style = "column" if round_it else str(random.choice(["square legs", "square legs", "trestles", "panels"]))
@@ -85,12 +76,12 @@ def table(random: Generator, *, width_m: Size = None, depth_m: Size = None, heig
     return assembled("table", parts, (w, d, h), name, (top_surface(w, d, h, round_it),))
 
 
-def coffee_table(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def coffee_table(random: Random, wanted: WantedSize) -> Item:
     """A low table: round, with a shelf below, on hairpins or panels, or with a dark glass top."""
     style = str(random.choice(["round", "shelf", "hairpins", "panels", "glass"]))
-    w = drawn(random, width_m, *((0.65, 0.9) if style == "round" else (0.85, 1.25)))
-    d = drawn(random, depth_m, *((w, w) if style == "round" else (0.48, 0.68)))
-    h = drawn(random, height_m, 0.36, 0.46)
+    w = drawn(random, wanted.width_m, *((0.65, 0.9) if style == "round" else (0.85, 1.25)))
+    d = drawn(random, wanted.depth_m, *((w, w) if style == "round" else (0.48, 0.68)))
+    h = drawn(random, wanted.height_m, 0.36, 0.46)
     name, top = finish(random, 0.2)
     round_it, thick = style == "round" and 0.6 < w / d < 1.7, float(random.uniform(0.025, 0.05))
     under = metal(random) if style in ("hairpins", "glass") else top
@@ -107,11 +98,10 @@ def coffee_table(random: Generator, *, width_m: Size = None, depth_m: Size = Non
     return assembled("coffee table", parts, (w, d, h), name, surfaces)
 
 
-def desk(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def desk(random: Random, wanted: WantedSize) -> Item:
     """A work table: drawers on one side, on both, or shallow ones under the top; a modesty panel at the back."""
     style = str(random.choice(["pedestal", "two pedestals", "shallow"]))
-    w, d = drawn(random, width_m, 1.05, 1.6), drawn(random, depth_m, 0.55, 0.75)
-    h = drawn(random, height_m, 0.72, 0.77)
+    w, d, h = wanted.fill(random, (1.05, 1.6), (0.55, 0.75), (0.72, 0.77))
     name, top = finish(random, 0.15)
     body = top if random.random() < 0.6 else finish(random, 0.4)[1]
     fronts = fronts_of(random, body)
@@ -141,11 +131,10 @@ def desk(random: Generator, *, width_m: Size = None, depth_m: Size = None, heigh
     return assembled("desk", parts, (w, d, h), name, (top_surface(w, d, h, False),))
 
 
-def nightstand(random: Generator, *, width_m: Size = None, depth_m: Size = None, height_m: Size = None) -> Item:
+def nightstand(random: Random, wanted: WantedSize) -> Item:
     """A small case beside a bed: two drawers, a drawer above an open shelf, or a drawer above a door."""
     style = str(random.choice(["drawers", "open", "door"]))
-    w, d = drawn(random, width_m, 0.38, 0.52), drawn(random, depth_m, 0.34, 0.44)
-    h = drawn(random, height_m, 0.45, 0.62)
+    w, d, h = wanted.fill(random, (0.38, 0.52), (0.34, 0.44), (0.45, 0.62))
     name, body = finish(random)
     fronts = fronts_of(random, body)
     base, z0 = standing(random, w, d, h, body)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.runtime.arrays import F64
-from placegraph.tools.simulator.catalogue import Design
-from placegraph.tools.simulator.catalogue._item_assembly import chance, drawn, fitted, hoop
+from placegraph.tools.simulator.catalogue._item_assembly import Random, WantedSize, chance, drawn, fitted, hoop
 from placegraph.tools.simulator.color_palette import COLORS, MUTED, VIVID, darker, jitter, pick
 from placegraph.tools.simulator.house_model import Color, Item, Material, Part
-from placegraph.tools.simulator.mesh_primitives import block, ellipsoid, moved, turned
+from placegraph.tools.simulator.mesh_primitives import block, ellipsoid, grid_faces, moved, turned
 
 _FURS: dict[str, Color] = {"brown": (122, 80, 48), "light brown": (178, 132, 84), "beige": (212, 190, 154),
                            "gray": (140, 138, 136), "white": (228, 222, 212), "pink": (220, 156, 172)}  # fmt: skip
@@ -22,28 +21,17 @@ def _puffed(width_m: float, depth_m: float, height_m: float, material: Material,
     x, y = u * (1 - 0.08 * (1 - v**2)), v * (1 - 0.08 * (1 - u**2))
     bulge = np.sqrt(np.clip((1 - u**4) * (1 - v**4), 0, None)) * height_m / 2
     sheet = np.stack((x * width_m / 2, y * depth_m / 2, bulge), axis=1)
-    faces = []
-    for i in range(count - 1):
-        for j in range(count - 1):
-            a, b = i * count + j, (i + 1) * count + j
-            faces += [(a, a + 1, b + 1), (a, b + 1, b)]
-    upper = np.array(faces, np.int32)
+    upper = grid_faces(count, count)
     vertices = np.concatenate((sheet, sheet * np.array([1, 1, -1])))
     return Part(vertices, np.concatenate((upper, upper[:, ::-1] + len(sheet))), material)
 
 
-def pillow(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def pillow(random: Random, wanted: WantedSize) -> Item:
     """A bed pillow or a square cushion, lying; one that is given taller than deep stands on its edge."""
     bed = chance(random, 0.35)
-    width = drawn(random, width_m, *((0.55, 0.75) if bed else (0.38, 0.5)))
-    depth = drawn(random, depth_m, 0.36, 0.45) if bed else (width if depth_m is None else depth_m)
-    height = drawn(random, height_m, 0.12, 0.18)
+    width = drawn(random, wanted.width_m, *((0.55, 0.75) if bed else (0.38, 0.5)))
+    depth = drawn(random, wanted.depth_m, 0.36, 0.45) if bed else (width if wanted.depth_m is None else wanted.depth_m)
+    height = drawn(random, wanted.height_m, 0.12, 0.18)
     name, color = pick(random, ("white", "white", "beige", "blue", "gray") if bed else (*VIVID, *MUTED))
     texture = str(random.choice(["plain", "fabric"] if bed else ["fabric", "stripes", "checks", "plain"]))
     second = darker(color, 0.8) if texture == "fabric" else pick(random, MUTED)[1]
@@ -59,20 +47,14 @@ def pillow(
     return fitted("pillow", parts, (width, depth, height), name)
 
 
-def teddy_bear(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def teddy_bear(random: Random, wanted: WantedSize) -> Item:
     """A sitting bear with round ears, a pale muzzle, legs stretched to the front, often a bow or a shirt."""
     name = str(random.choice(list(_FURS)))
     fur = Material(jitter(_FURS[name], random), "noise", darker(_FURS[name], 0.8), 0.03)
     pale = Material(darker(fur.color, 1.3) if name != "white" else (206, 176, 150))
     dark = Material((28, 24, 24), gloss=0.6)
     shirt = Material(pick(random, VIVID)[1], "stripes", (236, 234, 228), 0.05) if chance(random, 0.35) else fur
-    s, belly = drawn(random, height_m, 0.22, 0.5) / 0.96, float(random.uniform(0.2, 0.26))
+    s, belly = drawn(random, wanted.height_m, 0.22, 0.5) / 0.96, float(random.uniform(0.2, 0.26))
     parts = [ellipsoid((0, 0, 0.3), (belly, 0.19, 0.3), shirt, sides=10)]
     parts += [ellipsoid((0, -0.01, 0.7), (0.2, 0.18, 0.19), fur, sides=10)]
     parts += [ellipsoid((0, -0.17, 0.65), (0.09, 0.07, 0.07), pale, sides=7)]
@@ -91,7 +73,7 @@ def teddy_bear(
         for side in (-1, 1):
             parts.append(ellipsoid((side * 0.07, -0.19, 0.53), (0.075, 0.025, 0.045), bow, sides=4))
     scaled = [Part(part.vertices * s, part.faces, part.material) for part in parts]
-    return fitted("teddy bear", scaled, (width_m, depth_m, height_m), name)
+    return fitted("teddy bear", scaled, wanted, name)
 
 
 def _icosahedron() -> F64:
@@ -123,7 +105,7 @@ def _patches(rings: list[F64], radius_m: float, material: Material) -> Part:
     return Part(np.concatenate(vertices) * radius_m, np.array(faces, np.int32), material)
 
 
-def _football(random: np.random.Generator, radius_m: float) -> tuple[str, list[Part]]:
+def _football(random: Random, radius_m: float) -> tuple[str, list[Part]]:
     """Twelve dark pentagons and twenty light hexagons: a third of each edge belongs to each of its ends."""
     corners = _icosahedron()
     near = corners @ corners.T > 0.4
@@ -141,7 +123,7 @@ def _football(random: np.random.Generator, radius_m: float) -> tuple[str, list[P
     return "white", [_patches(pentagons, radius_m, Material(dark, gloss=0.3)), _patches(hexagons, radius_m, light)]
 
 
-def _basketball(random: np.random.Generator, radius_m: float) -> tuple[str, list[Part]]:
+def _basketball(random: Random, radius_m: float) -> tuple[str, list[Part]]:
     skin = Material(jitter((206, 108, 46), random), "noise", (178, 88, 36), 0.02)
     seam = Material((36, 28, 26))
     parts = [ellipsoid((0, 0, 0), (radius_m, radius_m, radius_m), skin, sides=14)]
@@ -149,7 +131,7 @@ def _basketball(random: np.random.Generator, radius_m: float) -> tuple[str, list
     return "orange", [turned(part, random.uniform(0, 1), "z") for part in (*parts, ring, turned(ring, np.pi / 2, "z"))]
 
 
-def _beach_ball(random: np.random.Generator, radius_m: float) -> tuple[str, list[Part]]:
+def _beach_ball(random: Random, radius_m: float) -> tuple[str, list[Part]]:
     """Six lunes of three colours."""
     names = [str(name) for name in random.permutation(list(VIVID))[:2]]
     colors = [COLORS["white"], *(jitter(COLORS[name], random) for name in names)]
@@ -161,21 +143,14 @@ def _beach_ball(random: np.random.Generator, radius_m: float) -> tuple[str, list
     return "", [turned(part, lean, "x") for part in parts]
 
 
-def ball(
-    random: np.random.Generator,
-    *,
-    width_m: float | None = None,
-    depth_m: float | None = None,
-    height_m: float | None = None,
-) -> Item:
+def ball(random: Random, wanted: WantedSize) -> Item:
     """A football, a basketball or a beach ball; one size that is given holds for all three."""
-    asked = next((size for size in (width_m, depth_m, height_m) if size is not None), None)
-    size = drawn(random, asked, 0.19, 0.26)
+    size = drawn(random, next((size_m for size_m in wanted if size_m is not None), None), 0.19, 0.26)
     kinds = (_football, _football, _basketball, _beach_ball)
     name, parts = kinds[int(random.integers(len(kinds)))](random, size / 2)
     turn = float(random.uniform(0, 2 * np.pi))
     parts = [moved(turned(part, turn, "z"), (0, 0, size / 2)) for part in parts]
-    return fitted("ball", parts, (width_m or size, depth_m or size, height_m or size), name)
+    return fitted("ball", parts, (wanted.width_m or size, wanted.depth_m or size, wanted.height_m or size), name)
 
 
-DESIGNS: dict[str, Design] = {"pillow": pillow, "teddy bear": teddy_bear, "ball": ball}
+DESIGNS = {"pillow": pillow, "teddy bear": teddy_bear, "ball": ball}

@@ -126,3 +126,8 @@ def entrance_area(random: np.random.Generator, area_m2: float) -> Iterator[Group
                 )
             x += width + float(random.uniform(0.06, 0.15))
         yield layout
+
+
+GROUPS = {
+    layouts.__name__: layouts for layouts in (sleeping_area, storage_area, cupboard_area, work_area, entrance_area)
+}

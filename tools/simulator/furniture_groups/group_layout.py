@@ -5,7 +5,7 @@ A group that stands free has its middle at the origin. Metres and radians.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +15,8 @@ from placegraph.tools.simulator.catalogue import design
 from placegraph.tools.simulator.house_model import ON_FLOOR, Item, SupportSurface
 
 WALL_GAP_M = 0.04  # between furniture and wall, for the baseboard
+GroupBuilder = Callable[[np.random.Generator, float], Iterator["GroupLayout"]]  # layouts for a room of so many m2
+
 EDGE_M = 0.01  # smallest distance of an item to the edge of its support
 
 

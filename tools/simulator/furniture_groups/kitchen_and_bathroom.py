@@ -104,3 +104,6 @@ def laundry_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupL
     alone = GroupLayout("", random)
     alone.place_at_wall(alone.design("washing machine"), 0)
     yield alone
+
+
+GROUPS = {layouts.__name__: layouts for layouts in (cooking_area, washing_area, bathing_area, laundry_area)}

@@ -176,3 +176,9 @@ def play_area(random: np.random.Generator, area_m2: float) -> Iterator[GroupLayo
                 )
                 x += reach + float(random.uniform(0.02, 0.12))
         yield layout
+
+
+GROUPS = {
+    layouts.__name__: layouts
+    for layouts in (seating_area, media_area, reading_area, music_area, dining_area, play_area)
+}

@@ -17,7 +17,6 @@ POSITIONS_PER_ROOM = 3  # random positions per room
 MIN_VIEW_M, MAX_VIEW_M = 0.8, 6.0  # distance range from the eyes to the anchor
 CLEAR_M, NOT_BEYOND_M = 0.35, 0.15  # YES above the first, NO below minus the second
 MAX_CROSS_RATIO = 0.8  # largest ratio of the other axis to the main one
-VIEWS = ("left", "right", "front", "behind")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +65,7 @@ def _entrance(house: House, room: Room, places: F64) -> AskerPosition | None:
     if len(ways) != 1:
         return None
     wall, opening = ways[0]
-    a, b = np.array(wall.a), np.array(wall.b)
-    middle = a + (b - a) / np.linalg.norm(b - a) * (opening.start_m + opening.end_m) / 2
-    distance = np.linalg.norm(places - middle, axis=1)
+    distance = np.linalg.norm(places - wall.middle_of(opening), axis=1)
     nearest = int(np.argmin(distance))
     word = "door" if opening.kind == "door" else "doorway"
     return AskerPosition(places[nearest], word) if distance[nearest] < 0.9 else None

@@ -9,6 +9,7 @@ import numpy as np
 from placegraph.runtime.arrays import F64
 from placegraph.tools.simulator.house_model import FurnitureLocation
 from placegraph.tools.simulator.occupancy_grid import points_in_polygon
+from placegraph.tools.simulator.question_generation import WORDS
 from placegraph.tools.simulator.question_generation.box_relations import MAYBE, NO, YES, TernaryArray, single_match
 from placegraph.tools.simulator.question_generation.class_synonyms import ItemMention
 from placegraph.tools.simulator.question_generation.item_table import ItemTable
@@ -20,12 +21,6 @@ HEIGHT_RATIO, HEIGHT_LEAD_M = 1.15, 0.1
 LEVEL_LEAD_M = 0.25
 ROOM_WIDE_LOCATIONS = ("cooking area", "bathing area", "washing area", "laundry area", "sleeping area", "entrance area")
 NEAR_LOCATION_M = 1.2  # items this near to an outline may count as part of the location
-# Colours that are confused by people or under lamp light.
-SIMILAR_COLORS: tuple[tuple[str, ...], ...] = (
-    ("white", "beige", "gray"), ("beige", "light brown", "yellow", "orange"), ("light brown", "brown", "orange"),
-    ("gray", "black"), ("black", "brown"), ("red", "orange", "pink", "brown"), ("orange", "yellow"),
-    ("pink", "purple"), ("blue", "purple"), ("yellow", "white"),
-)  # fmt: skip
 
 
 NO_COLOR = ("window", "mirror")  # only their thin frame has a colour
@@ -34,18 +29,16 @@ NO_COLOR = ("window", "mirror")  # only their thin frame has a colour
 def attribute_questions(table: ItemTable, search_scopes: tuple[SearchScope, ...]) -> Iterator[QuestionSpec]:
     """Questions of the forms unique, floor, room, superlative, size and color."""
     for scope in search_scopes:
-        for item_id in np.flatnonzero(table.can_be_target & scope.mask).tolist():
-            for name_group in table.name_groups[item_id]:
-                peers = np.flatnonzero(table.of(name_group.classes) & scope.mask)
-                mention = ItemMention(item_id, name_group)
-                if len(peers) == 1:
-                    is_ambiguous = np.count_nonzero(table.of(name_group.classes)) > 1
-                    form = {"house": "unique", "floor": "floor", "room": "room"}[scope.kind]
-                    if is_ambiguous or scope.kind == "house":
-                        yield QuestionSpec(form, mention, scope)
-                elif table.has_class_peer(item_id, scope.mask):
-                    yield from _by_color(table, scope, mention, peers)
-                    yield from _by_measure(table, scope, mention, peers)
+        for mention in table.mentions(table.can_be_target & scope.mask):
+            peers = np.flatnonzero(table.peers(mention, scope.mask))
+            if len(peers) == 1:
+                is_ambiguous = np.count_nonzero(table.of(mention.name_group.classes)) > 1
+                form = {"house": "unique", "floor": "floor", "room": "room"}[scope.kind]
+                if is_ambiguous or scope.kind == "house":
+                    yield QuestionSpec(form, mention, scope)
+            elif table.has_class_peer(mention.id, scope.mask):
+                yield from _by_color(table, scope, mention, peers)
+                yield from _by_measure(table, scope, mention, peers)
 
 
 def may_be_confused(first: str, second: str) -> bool:
@@ -54,7 +47,7 @@ def may_be_confused(first: str, second: str) -> bool:
         not first
         or not second
         or first == second
-        or any(first in group and second in group for group in SIMILAR_COLORS)
+        or any(first in group and second in group for group in WORDS["similar_colors"])
     )
 
 
@@ -116,15 +109,11 @@ def location_questions(table: ItemTable, search_scopes: tuple[SearchScope, ...])
         for scope in search_scopes:
             if scope.kind == "room" or not _is_alone(table, scope, place):
                 continue
-            for item_id in np.flatnonzero(table.can_be_target & scope.mask & (answers == YES)).tolist():
-                for name_group in table.name_groups[item_id]:
-                    peers = table.of(name_group.classes) & scope.mask
-                    if single_match(answers, peers) == item_id:
-                        is_ambiguous = table.has_class_peer(item_id, scope.mask)
-                        yield QuestionSpec(
-                            "location", ItemMention(item_id, name_group), scope, phrases=(f"in the {place.kind}",),
-                            conditions=(f"room ({place.kind})",), is_ambiguous=is_ambiguous,
-                        )  # fmt: skip
+            for mention in table.mentions(table.can_be_target & scope.mask & (answers == YES)):
+                if single_match(answers, table.peers(mention, scope.mask)) == mention.id:
+                    is_ambiguous = table.has_class_peer(mention.id, scope.mask)
+                    phrases, conditions = (f"in the {place.kind}",), (f"room ({place.kind})",)
+                    yield QuestionSpec("location", mention, scope, "", phrases, conditions, is_ambiguous=is_ambiguous)
 
 
 def _is_alone(table: ItemTable, scope: SearchScope, place: FurnitureLocation) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,7 @@ import numpy as np
 from placegraph.runtime.arrays import F64, I64, Bool
 from placegraph.runtime.errors import ConfigError
 from placegraph.tools.simulator.house_model import House
-from placegraph.tools.simulator.question_generation.class_synonyms import ClassSet, NameGroup, name_groups
+from placegraph.tools.simulator.question_generation.class_synonyms import ClassSet, ItemMention, NameGroup, name_groups
 
 MIN_TARGET_M = 0.12  # smallest largest extent that a camera can map
 MIN_ANCHOR_M = 0.3
@@ -92,6 +93,14 @@ class ItemTable:
             masks = [self._of_class[name] for name in names]
             self._masks_by_classes[classes] = np.logical_or.reduce([np.zeros(self.count, bool), *masks])
         return self._masks_by_classes[classes]
+
+    def mentions(self, mask: Bool) -> Iterator[ItemMention]:
+        """The items of a mask (N,) by id, each with all its names."""
+        return (ItemMention(k, names) for k in np.flatnonzero(mask).tolist() for names in self.name_groups[k])
+
+    def peers(self, mention: ItemMention, mask: Bool) -> Bool:
+        """(N,) which items of a mask the words of a mention may mean."""
+        return np.asarray(self.of(mention.name_group.classes) & mask)
 
     def has_class_peer(self, item_id: int, mask: Bool) -> bool:
         """Whether a mask (N,) holds another item of the same class."""

@@ -6,46 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from placegraph.tools.simulator.question_generation.class_synonyms import PLURAL, NameGroup
+from placegraph.tools.simulator.question_generation import WORDS
+from placegraph.tools.simulator.question_generation.class_synonyms import NameGroup
 from placegraph.tools.simulator.question_generation.question_spec import QuestionSpec
 from placegraph.tools.simulator.question_generation.search_scopes import ScopePhrase
 
 HELD_OUT_TARGET_SHARE, HELD_OUT_ANCHOR_SHARE = 0.25, 0.06  # share of held-out words
-COMMANDS = (
-    "find {}", "show me {}", "take me to {}", "go to {}", "lead me to {}", "guide me to {}", "point out {}",
-    "look for {}", "bring me to {}", "locate {}",
-)  # fmt: skip
-QUESTIONS = (
-    "where is {}", "can you show me {}", "could you find {}", "do you know where {} is", "can you tell me where {} is",
-    "could you take me to {}", "where can I find {}", "can you find {} for me", "would you show me {}",
-)  # fmt: skip
-STATEMENTS = ("I'm looking for {}", "I need {}", "I want to see {}", "I can't find {}", "I'd like to go to {}", "{}")
-GREETINGS = ("hey, ", "excuse me, ", "hi, ", "hello, ", "robot, ")
-# Variants of a relation, by the beginning of the phrase.
-RELATION_VARIANTS: dict[str, tuple[str, ...]] = {
-    "next to the": ("next to the", "beside the", "right by the", "right next to the"),
-    "near the": ("near the", "close to the", "not far from the"),
-    "on the": ("on the", "on the", "that is on the"),
-    "under the": ("under the", "underneath the"),
-    "below the": ("below the", "under the", "underneath the"),
-    "above the": ("above the", "over the"),
-    "closest to the": ("closest to the", "nearest to the", "nearest the"),
-    "farthest from the": ("farthest from the", "furthest away from the", "furthest from the"),
-    "to the left of the": ("to the left of the", "left of the", "on the left of the"),
-    "to the right of the": ("to the right of the", "right of the", "on the right of the"),
-    "in front of the": ("in front of the",),
-    "behind the": ("behind the",),
-}
-ADJECTIVE_VARIANTS: dict[str, tuple[str, ...]] = {
-    "largest": ("largest", "biggest"), "big": ("big", "larger", "bigger", "large"),
-    "small": ("small", "smaller", "little"), "highest": ("highest",), "gray": ("gray", "grey"),
-}  # fmt: skip
-
-RANKS = {
-    "largest": "largest", "biggest": "largest", "larger": "largest", "bigger": "largest", "smallest": "smallest",
-    "smaller": "smallest", "tallest": "tallest", "highest": "highest", "lowest": "lowest",
-}  # fmt: skip
-ROW_ADJECTIVES = ("leftmost", "rightmost", "middle", "first", "second", "third", "fourth")
 
 
 def phrase_question(spec: QuestionSpec, random: np.random.Generator) -> tuple[str, tuple[int, ...], str]:
@@ -58,7 +24,7 @@ def phrase_question(spec: QuestionSpec, random: np.random.Generator) -> tuple[st
     adjective = spec.adjective
     conditions = ["; ".join(spec.conditions).format(*words)] if spec.conditions else []
     if adjective:
-        adjective = str(random.choice(ADJECTIVE_VARIANTS.get(adjective, (adjective,))))
+        adjective = str(random.choice(WORDS["adjective_variants"].get(adjective, (adjective,))))
         conditions = [*_adjective_conditions(adjective), *conditions]
         adjective += " "
     place, ids, location_membership = scope.text, [anchor.id for anchor in spec.anchors], scope.conditions
@@ -75,9 +41,9 @@ def phrase_question(spec: QuestionSpec, random: np.random.Generator) -> tuple[st
 
 def _adjective_conditions(adjective: str) -> tuple[str, ...]:
     """The program condition of an adjective: a rank or a property; none for a place in a row."""
-    if adjective in ROW_ADJECTIVES:
+    if adjective in WORDS["row_adjectives"]:
         return ()
-    return (RANKS.get(adjective, f"is {adjective}"),)
+    return (WORDS["adjective_ranks"].get(adjective, f"is {adjective}"),)
 
 
 def usable_scope_phrases(spec: QuestionSpec) -> tuple[ScopePhrase, ...]:
@@ -109,7 +75,7 @@ def _word(name_group: NameGroup, random: np.random.Generator, held_out_words: fl
 
 def _vary_relation(phrase: str, random: np.random.Generator) -> str:
     """The phrase with its leading relation said in another way."""
-    for known, variants in RELATION_VARIANTS.items():
+    for known, variants in WORDS["relation_variants"].items():
         if phrase.startswith(known):
             return str(random.choice(variants)) + phrase[len(known) :]
     return phrase
@@ -120,13 +86,13 @@ def _sentence(adjective: str, noun: str, phrase: str, place: str, random: np.ran
     fronted = bool(place and (phrase or not which) and random.random() < 0.2)
     details = " ".join(part for part in (phrase, "" if fronted else place) if part)
     if which:
-        text = f"which {noun} {'are' if noun in PLURAL else 'is'} {details.removeprefix('that is ')}?"
+        text = f"which {noun} {'are' if noun in WORDS['plural'] else 'is'} {details.removeprefix('that is ')}?"
     else:
-        text = _add_opener(f"the {adjective}{noun} {details}".strip(), noun in PLURAL, random)
+        text = _add_opener(f"the {adjective}{noun} {details}".strip(), noun in WORDS["plural"], random)
     if fronted:
         text = f"{place}, {text}"
     elif random.random() < 0.12:
-        text = str(random.choice(GREETINGS)) + text
+        text = str(random.choice(WORDS["greetings"])) + text
     if random.random() < 0.15:
         text = f"{text[:-1]}, please{text[-1]}"
     return text[0].upper() + text[1:] if random.random() < 0.75 else text.rstrip(".?")
@@ -136,8 +102,8 @@ def _add_opener(phrase: str, plural: bool, random: np.random.Generator) -> str:
     """A noun phrase as a question, a command or a statement, with its punctuation."""
     roll = random.random()
     if roll < 0.45:
-        text = str(random.choice(QUESTIONS))
+        text = str(random.choice(WORDS["questions"]))
         if plural:
             text = text.replace("where is", "where are").replace("{} is", "{} are")
         return text.format(phrase) + "?"
-    return str(random.choice(COMMANDS if roll < 0.75 else STATEMENTS)).format(phrase) + "."
+    return str(random.choice(WORDS["commands" if roll < 0.75 else "statements"])).format(phrase) + "."

@@ -29,11 +29,5 @@ class QuestionSpec:
 
 def unique_mentions(table: ItemTable, scope: SearchScope) -> list[ItemMention]:
     """All anchors of a scope with the words that mean nothing else there."""
-    mentions = []
-    for item_id in np.flatnonzero(table.can_be_anchor & scope.mask).tolist():
-        mentions += [
-            ItemMention(item_id, name_group)
-            for name_group in table.name_groups[item_id]
-            if np.count_nonzero(table.of(name_group.classes) & scope.mask) == 1
-        ]
-    return mentions
+    mentions = table.mentions(table.can_be_anchor & scope.mask)
+    return [mention for mention in mentions if np.count_nonzero(table.peers(mention, scope.mask)) == 1]

@@ -42,8 +42,7 @@ def relation_questions(
         for form, relation in answers.items():
             column = relation[:, anchor.id]
             for target in _targets(table, scope, anchor, column == YES):
-                peers = table.of(target.name_group.classes) & scope.mask
-                if single_match(column, peers) == target.id:
+                if single_match(column, table.peers(target, scope.mask)) == target.id:
                     yield _question(table, form, target, scope, (anchor,))
         yield from _by_distance(table, scope, anchor)
 
@@ -52,10 +51,9 @@ def _targets(table: ItemTable, scope: SearchScope, anchor: ItemMention, fit: Boo
     """Items that may be asked for by an anchor, with all words that also mean another item of the house."""
     longest = table.size.max(axis=1)
     fit = fit & table.can_be_target & scope.mask & (longest[anchor.id] >= MIN_ANCHOR_SIZE_RATIO * longest)
-    for item_id in np.flatnonzero(fit).tolist():
-        for name_group in table.name_groups[item_id]:
-            if item_id != anchor.id and np.count_nonzero(table.of(name_group.classes)) > 1:
-                yield ItemMention(item_id, name_group)
+    for target in table.mentions(fit):
+        if target.id != anchor.id and np.count_nonzero(table.of(target.name_group.classes)) > 1:
+            yield target
 
 
 def _question(
@@ -72,7 +70,7 @@ def _by_distance(table: ItemTable, scope: SearchScope, anchor: ItemMention) -> I
         if target.name_group.classes in done:
             continue  # one search covers all items that share a word
         done.add(target.name_group.classes)
-        peers = table.of(target.name_group.classes) & scope.mask
+        peers = table.peers(target, scope.mask)
         peers[anchor.id] = False
         for form, winner in (
             ("closest", closest(table, anchor.id, peers)),
@@ -101,7 +99,7 @@ def between_questions(table: ItemTable, scope: SearchScope) -> Iterator[Question
                 continue
             answers = between(table, first.id, second.id)
             for target in _targets(table, scope, first, answers == YES):
-                if single_match(answers, table.of(target.name_group.classes) & scope.mask) == target.id:
+                if single_match(answers, table.peers(target, scope.mask)) == target.id:
                     yield _question(table, "between", target, scope, (first, second))
 
 
@@ -119,23 +117,12 @@ def two_relation_questions(
             ]
             joint = np.minimum(answers[form][:, first.id], answers[second_form][:, second.id])
             for target in _targets(table, scope, first, joint == YES):
-                peers = table.of(target.name_group.classes) & scope.mask
-                if (
-                    target.id != second.id
-                    and table.has_class_peer(target.id, scope.mask)
-                    and single_match(joint, peers) == target.id
-                ):
-                    joiner = " and " if form != "on" else " "
-                    phrase = joiner.join((PHRASES[form], PHRASES[second_form]))
-                    yield QuestionSpec(
-                        "two anchors",
-                        target,
-                        scope,
-                        "",
-                        (phrase,),
-                        (PROGRAM_TEXTS[form], PROGRAM_TEXTS[second_form]),
-                        (first, second),
-                    )
+                peers = table.peers(target, scope.mask)
+                is_ambiguous = table.has_class_peer(target.id, scope.mask)
+                if target.id != second.id and is_ambiguous and single_match(joint, peers) == target.id:
+                    phrase = (" and " if form != "on" else " ").join((PHRASES[form], PHRASES[second_form]))
+                    conditions = (PROGRAM_TEXTS[form], PROGRAM_TEXTS[second_form])
+                    yield QuestionSpec("two anchors", target, scope, "", (phrase,), conditions, (first, second))
 
 
 def chain_questions(table: ItemTable, scope: SearchScope, answers: dict[str, TernaryArray]) -> Iterator[QuestionSpec]:
@@ -143,11 +130,10 @@ def chain_questions(table: ItemTable, scope: SearchScope, answers: dict[str, Ter
     for last in unique_mentions(table, scope):
         for link in ("next to", "near", "below"):
             linked = answers[link][:, last.id]
-            for middle in np.flatnonzero(table.can_be_anchor & scope.mask & (linked == YES)).tolist():
-                for name_group in table.name_groups[middle]:
-                    group = table.of(name_group.classes) & scope.mask
-                    if np.count_nonzero(group) > 1 and single_match(linked, group) == middle:
-                        yield from _chain_targets(table, scope, answers, ItemMention(middle, name_group), last, link)
+            for middle in table.mentions(table.can_be_anchor & scope.mask & (linked == YES)):
+                group = table.peers(middle, scope.mask)
+                if np.count_nonzero(group) > 1 and single_match(linked, group) == middle.id:
+                    yield from _chain_targets(table, scope, answers, middle, last, link)
 
 
 def _chain_targets(
@@ -161,7 +147,7 @@ def _chain_targets(
     for form in ("on", "next to", "above"):
         column = answers[form][:, middle.id]
         for target in _targets(table, scope, middle, column == YES):
-            peers = table.of(target.name_group.classes) & scope.mask
+            peers = table.peers(target, scope.mask)
             if (
                 target.id == last.id
                 or not table.has_class_peer(target.id, scope.mask)

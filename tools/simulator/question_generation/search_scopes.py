@@ -8,17 +8,10 @@ import numpy as np
 
 from placegraph.runtime.arrays import Bool
 from placegraph.tools.simulator.house_model import Room
+from placegraph.tools.simulator.question_generation import WORDS
 from placegraph.tools.simulator.question_generation.class_synonyms import ItemMention
 from placegraph.tools.simulator.question_generation.item_table import ItemTable
 
-ROOM_WORDS: dict[str, tuple[str, ...]] = {
-    "living room": ("living room", "living room", "lounge"),
-    "kitchen": ("kitchen",),
-    "office": ("office", "office", "study"),
-    "laundry": ("laundry room", "laundry"),
-    "hallway": ("hallway", "hall"),
-    "corridor": ("corridor", "hallway"),
-}
 INTERCHANGEABLE_ROOMS = ("hallway", "corridor")  # words that are used for each other
 AREA_RATIO = 1.25  # smallest ratio of areas for "larger"
 
@@ -87,11 +80,11 @@ def _rooms_of_word(table: ItemTable, room: Room) -> list[Room]:
 
 
 def _room_words(table: ItemTable, room: Room) -> tuple[ScopePhrase, ...]:
-    names = ROOM_WORDS.get(room.type, (room.type,))
-    may_be_confused = _rooms_of_word(table, room)
-    if len(may_be_confused) == 1:
+    names = WORDS["room_words"].get(room.type, (room.type,))
+    same_named = _rooms_of_word(table, room)
+    if len(same_named) == 1:
         return tuple(_in_room(name, name) for name in names)
-    floor_mates = [words_for_floor for words_for_floor in may_be_confused if words_for_floor.floor == room.floor]
+    floor_mates = [words_for_floor for words_for_floor in same_named if words_for_floor.floor == room.floor]
     words = []
     floors = len(table.house.floors)
     if floors > 1 and len(floor_mates) == 1:
@@ -108,14 +101,12 @@ def _room_words(table: ItemTable, room: Room) -> tuple[ScopePhrase, ...]:
             for adjective in _size_words(room, floor_mates)
             if ending
         ]
-    words += [
-        _in_room(f"{size} {names[0]}", names[0], _size_condition(size)) for size in _size_words(room, may_be_confused)
-    ]
-    return tuple(words + _content_words(table, room, may_be_confused, names[0]))
+    words += [_in_room(f"{size} {names[0]}", names[0], _size_condition(size)) for size in _size_words(room, same_named)]
+    return tuple(words + _content_words(table, room, same_named, names[0]))
 
 
 def _size_words(room: Room, rooms: list[Room]) -> tuple[str, ...]:
-    area, other_areas = area_m2(room), [area_m2(other) for other in rooms if other.id != room.id]
+    area, other_areas = room.area_m2, [other.area_m2 for other in rooms if other.id != room.id]
     if not other_areas:
         return ()
     if area >= AREA_RATIO * max(other_areas):
@@ -131,15 +122,9 @@ def _size_condition(adjective: str) -> str:
     )
 
 
-def area_m2(room: Room) -> float:
-    """The area of a room's polygon."""
-    x, y = room.polygon.T
-    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
-
-
-def _content_words(table: ItemTable, room: Room, may_be_confused: list[Room], name: str) -> list[ScopePhrase]:
+def _content_words(table: ItemTable, room: Room, same_named: list[Room], name: str) -> list[ScopePhrase]:
     """The room with the desk: no other room that the word may mean has one."""
-    among = np.isin(table.room, [room.id for room in may_be_confused])
+    among = np.isin(table.room, [room.id for room in same_named])
     words = []
     for item_id in np.flatnonzero(table.can_be_anchor & (table.room == room.id)).tolist():
         for name_group in table.name_groups[item_id]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from placegraph.tools.simulator.house_model import ON_FLOOR
+from placegraph.tools.simulator.question_generation import WORDS
 from placegraph.tools.simulator.question_generation.asker_positions import (
     MAX_VIEW_M,
     MIN_VIEW_M,
@@ -21,18 +22,6 @@ from placegraph.tools.simulator.question_generation.item_table import ItemTable
 from placegraph.tools.simulator.question_generation.question_spec import QuestionSpec, unique_mentions
 from placegraph.tools.simulator.question_generation.search_scopes import SearchScope
 
-# Classes without a front: front and behind depend on the viewer alone.
-NO_FRONT = (
-    "table",
-    "coffee table",
-    "stool",
-    "potted plant",
-    "vase",
-    "lamp",
-    "coat rack",
-    "trash can",
-    "laundry basket",
-)
 FRONT_DEGREES = 45.0  # from an anchor's front; within it the viewer's and the anchor's front agree
 PHRASES: dict[str, str] = {
     "left": "to the left of the {}", "right": "to the right of the {}",
@@ -67,25 +56,14 @@ def _questions_from(
     for form, answers in view_relations(table, position.eye, anchor.id).items():
         if form in ("front", "behind") and not _faces_front(table, position, anchor.id):
             continue
-        for item_id in np.flatnonzero(table.can_be_target & scope.mask & (answers == YES)).tolist():
-            for name_group in table.name_groups[item_id]:
-                peers = table.of(name_group.classes) & scope.mask & table.same_room[:, anchor.id]
-                if single_match(answers, peers) != item_id or not _fits(table, form, item_id, anchor.id, peers):
-                    continue
-                is_ambiguous = table.has_class_peer(item_id, peers)
-                phrase = PHRASES[form] + (f" seen from the {position.door}" if position.door else "")
-                conditions = (PROGRAM_TEXTS[form], *_viewer_condition(position))
-                yield QuestionSpec(
-                    form,
-                    ItemMention(item_id, name_group),
-                    scope,
-                    "",
-                    (phrase,),
-                    conditions,
-                    (anchor,),
-                    position.eye,
-                    is_ambiguous,
-                )
+        for target in table.mentions(table.can_be_target & scope.mask & (answers == YES)):
+            peers = table.peers(target, scope.mask & table.same_room[:, anchor.id])
+            if single_match(answers, peers) != target.id or not _fits(table, form, target.id, anchor.id, peers):
+                continue
+            is_ambiguous = table.has_class_peer(target.id, peers)
+            phrases = (PHRASES[form] + (f" seen from the {position.door}" if position.door else ""),)
+            conditions = (PROGRAM_TEXTS[form], *_viewer_condition(position))
+            yield QuestionSpec(form, target, scope, "", phrases, conditions, (anchor,), position.eye, is_ambiguous)
 
 
 def _viewer_condition(position: AskerPosition) -> tuple[str, ...]:
@@ -106,7 +84,7 @@ def _fits(table: ItemTable, form: str, target: int, anchor: int, peers: np.ndarr
 
 def _faces_front(table: ItemTable, position: AskerPosition, anchor: int) -> bool:
     """Whether the asker stands in front of the anchor's own front, or it has none."""
-    if table.names[anchor] in NO_FRONT:
+    if table.names[anchor] in WORDS["no_front"]:
         return True
     yaw = table.house.items[anchor].yaw
     front = np.array([np.sin(yaw), -np.cos(yaw)])
@@ -120,14 +98,7 @@ def ordinal_questions(
     """Questions by place in a row: the second chair from the left, for a viewer who sees all of them."""
     if scope.room is None:
         return
-    kinds = sorted(
-        {
-            name_group.classes
-            for item_id in np.flatnonzero(scope.mask).tolist()
-            for name_group in table.name_groups[item_id]
-        },
-        key=sorted,
-    )
+    kinds = sorted({mention.name_group.classes for mention in table.mentions(scope.mask)}, key=sorted)
     for classes in kinds:
         ids = np.flatnonzero(table.of(classes) & scope.mask).tolist()
         if len(ids) < 2:

@@ -3,27 +3,9 @@
 from __future__ import annotations
 
 from placegraph.nodes.grounding.program import Condition, Thing
-from placegraph.tools.training.request_grammar import relation_phrases as relations
-from placegraph.tools.training.request_grammar import vocabulary as words
 from placegraph.tools.training.request_grammar.phrase_grammar import MAX_DEPTH, PhraseGrammar
+from placegraph.tools.training.request_grammar.phrase_tables import ENTERING, ORDINALS, PHRASES, TEMPLATES, WORDS
 
-GREETINGS = ("hey ,", "hi ,", "robot ,", "excuse me ,", "ok ,", "hello robot ,", "please", "so", "um ,", "hey there ,")
-ENDINGS = (
-    "please", "thanks", "in the room", "in this room", "in the house", "for me", "i think", "if you can", "thank you",
-    "right there", "right now", "in the picture", "from where i stand", "from here", "as seen from where i am",
-    "of the room", "i left it there", "when you have time", "in here", "that you can see",
-)  # fmt: skip
-ROOM_LINKS = (
-    "in the {}",
-    "in the {}",
-    "inside the {}",
-    "in {}",
-    "located within the {}",
-    "that is in the {}",
-    "of the {}",
-    "from the {}",
-)
-FLOOR_LINKS = {"upstairs": ("{}",), "downstairs": ("{}",)}
 SIDED = frozenset(
     ("leftmost", "rightmost", "left", "right", "front", "behind", "frontmost", "backmost", "middle", "nth")
 )
@@ -35,19 +17,19 @@ class ContextGrammar:
     def __init__(self, speaker: PhraseGrammar) -> None:
         self.say = speaker
 
-    def relation(self, text: str, conditions: list[Condition]) -> tuple[str, list[Condition]]:
-        """A room or storey, behind or in front."""
+    def add_place(self, text: str, conditions: list[Condition]) -> tuple[str, list[Condition]]:
+        """Adds a room or floor, before or after the request."""
         say = self.say
         conditions = list(conditions)
         if say.chance(0.12):
             said, condition = self._room()
             text, conditions = self._attach(text, conditions, said, condition)
         if say.chance(0.06):
-            floor = say.pick(words.FLOORS)
-            links = FLOOR_LINKS.get(
-                floor,
-                ("on the {}", "on the {}", "on {}") if floor[-1].isdigit() else ("on the {}", "of the {}", "on the {}"),
-            )
+            floor = say.pick(WORDS["floors"])
+            if floor in ("upstairs", "downstairs"):
+                links = ["{}"]
+            else:
+                links = ["on the {}", *(("on the {}", "on {}") if floor[-1].isdigit() else ("of the {}", "on the {}"))]
             said = say.random.choice(links).format(floor)
             text, conditions = self._attach(text, conditions, said, Condition(name="floor", words=floor))
         return text, conditions
@@ -63,13 +45,13 @@ class ContextGrammar:
 
     def _room(self) -> tuple[str, Condition]:
         say = self.say
-        room = say.pick(words.ROOMS if say.chance(0.75) else words.AREAS)
+        room = say.pick(WORDS["rooms"] if say.chance(0.75) else WORDS["areas"])
         inner: list[Condition] = []
         said = room
         luck = say.random.random()
         if luck < 0.12:
             number = say.random.choice((1, 2, 2, 3))
-            said = f"{'first' if number == 1 else words.ORDINALS[number][0]} {room}"
+            said = f"{'first' if number == 1 else ORDINALS[number][0]} {room}"
             inner.append(Condition(name="nth", number=number))
         elif luck < 0.2:
             look = say.pick(("large", "small", "big", "white", "blue", "green", "other", "guest", "yellow"))
@@ -77,7 +59,7 @@ class ContextGrammar:
             inner.append(Condition(name="is", words=look))
         elif luck < 0.26:
             name = say.weighted({"largest": 1, "smallest": 1})
-            said = f"{say.pick(relations.BEFORE[name])} {room}"
+            said = f"{say.pick(PHRASES['rank'][name])} {room}"
             inner.append(Condition(name=name))
         if say.chance(0.12):
             text, thing = say.anchor(MAX_DEPTH, simple=True)
@@ -87,11 +69,9 @@ class ContextGrammar:
             said, inner = f"{said} {link} {text}", [*inner, Condition(name=name, things=(thing,))]
         thing = Thing(noun=room, conditions=tuple(inner))
         if say.chance(0.07):
-            link = say.random.choice(
-                ("not in the {}", "outside of the {}", "outside the {}", "but not in the {}", "that is not in the {}")
-            )
+            link = say.random.choice(TEMPLATES["not_in_room"])
             return link.format(said), Condition(name="room", things=(thing,), negated=True)
-        return say.random.choice(ROOM_LINKS).format(said), Condition(name="room", things=(thing,))
+        return say.random.choice(TEMPLATES["room_links"]).format(said), Condition(name="room", things=(thing,))
 
     def add_viewpoint(self, text: str, conditions: list[Condition]) -> tuple[str, list[Condition]]:
         """Adds a viewpoint, more often where the target has a side."""
@@ -100,7 +80,7 @@ class ContextGrammar:
             return text, conditions
         luck = say.random.random()
         if luck < 0.1:
-            said, noun = say.random.choice(relations.ENTERING)
+            said, noun = say.random.choice(ENTERING)
             view = Condition(name="from", things=(Thing(noun=noun),))
             return self._attach_view(text, conditions, said, view, first=say.chance(0.7))
         if say.chance(0.3) and say.target_noun:
@@ -109,11 +89,11 @@ class ContextGrammar:
         else:
             anchor, thing = say.anchor(2, noun="door" if luck > 0.75 and say.chance(0.35) else "")
         first = say.chance(0.7)
-        name, options = "looking", relations.LOOKING_FIRST if first else relations.LOOKING_LAST
+        name, options = "looking", PHRASES["viewpoint"]["looking_first" if first else "looking_last"]
         if luck > 0.75:
-            name, options = "from", relations.FROM
+            name, options = "from", PHRASES["viewpoint"]["from"]
         if luck > 0.95:
-            name, options = "back", relations.BACK
+            name, options = "back", PHRASES["viewpoint"]["back"]
         return self._attach_view(
             text, conditions, say.pick(options).format(anchor), Condition(name=name, things=(thing,)), first=first
         )
@@ -124,12 +104,9 @@ class ContextGrammar:
         say = self.say
         if not first:
             return f"{text}{say.random.choice((' ', ', '))}{said}", [*conditions, view]
-        lead = say.random.choice(
-            (", ", ", ", ", ", " ", ", it's ", " it is ", ". ", ", you want ", " and choose ", ", pick ")
-        )
-        if text.startswith(("it", "this", "they", "i am", "which", "where", "what", "of ", "out of")) or text.split()[
-            0
-        ] in ("find", "choose"):
+        lead = say.random.choice(TEMPLATES["links_after_viewpoint"])
+        pronouns = ("it", "this", "they", "i am", "which", "where", "what", "of ", "out of")
+        if text.startswith(pronouns) or text.split()[0] in ("find", "choose"):
             lead = say.random.choice((", ", ", ", " ", ". "))
         return f"{said}{lead}{text}", [view, *conditions]
 
@@ -137,7 +114,7 @@ class ContextGrammar:
         """Adds greetings, fillers and punctuation."""
         say = self.say
         if say.chance(0.07):
-            text = f"{say.pick(GREETINGS)} {text}"
+            text = f"{say.pick(TEMPLATES['greetings'])} {text}"
         if say.chance(0.09):
-            text = f"{text}{say.random.choice((' ', ', '))}{say.pick(ENDINGS)}"
+            text = f"{text}{say.random.choice((' ', ', '))}{say.pick(TEMPLATES['endings'])}"
         return " ".join(text.split()) + say.random.choice(("", "", ".", ".", ".", "?" if say.chance(0.3) else ""))

@@ -12,8 +12,14 @@ from dataclasses import dataclass, field
 from random import Random
 
 from placegraph.nodes.grounding.program import CONDITIONS, SAME_KIND, Condition, Thing
-from placegraph.tools.training.request_grammar import relation_phrases as relations
-from placegraph.tools.training.request_grammar import vocabulary as words
+from placegraph.tools.training.request_grammar.phrase_tables import (
+    NUMBERS,
+    ORDINALS,
+    PHRASES,
+    TEMPLATES,
+    WEIGHTS,
+    WORDS,
+)
 
 HELD_SHARE = 8  # one in this many phrasings and nouns is kept for validation,
 COMMON = 3  # but for the first ones of each list, which are what most people say
@@ -78,7 +84,7 @@ class PhraseGrammar:
 
     def noun(self) -> str:
         """A noun, now and then misspelt, as it will stand in the text and in the program."""
-        lists = (words.FURNITURE, words.FIXTURES, words.THINGS, words.RARE)
+        lists = (WORDS["furniture"], WORDS["fixtures"], WORDS["things"], WORDS["rare"])
         return self.misspell(self.pick(self.random.choices(lists, (4, 4, 5, 1.5))[0]))
 
     def misspell(self, noun: str) -> str:
@@ -109,7 +115,7 @@ class PhraseGrammar:
 
     def adjectives(self, most: int) -> tuple[list[str], list[Condition]]:
         """Up to `most` adjectives before a noun, no two of one kind."""
-        sorts = [words.SIZES, words.STATES, words.SHAPES, words.COLORS, words.MATERIALS]
+        sorts = [WORDS["sizes"], WORDS["states"], WORDS["shapes"], WORDS["colors"], WORDS["materials"]]
         shares = self.random.choices(range(5), (5, 2.5, 1.5, 7, 2.5), k=most)
         said = [self.pick(sorts[i]) for i in sorted(set(shares))]
         if self.chance(0.15):
@@ -156,7 +162,7 @@ class PhraseGrammar:
             return text, Thing(noun=noun, conditions=(Condition(name="count", number=1),))
         number = self.random.choice((2, 2, 2, 3, 3, 4, 5, 6))
         noun = self.plural(self.noun())
-        said = "both" if number == 2 and self.chance(0.1) else self.random.choice(words.NUMBERS[number])
+        said = "both" if number == 2 and self.chance(0.1) else self.random.choice(NUMBERS[number])
         said = self.random.choice(("dual", "pair of")) if number == 2 and self.chance(0.12) else said
         adjectives, conditions = self.adjectives(1) if self.chance(0.25) else ([], [])
         text = " ".join([f"{'the ' if self.chance(0.5) and said != 'both' else ''}{said}", *adjectives, noun])
@@ -166,8 +172,8 @@ class PhraseGrammar:
         """A noun with adjectives, a rank and a condition after it; fewer with depth."""
         phrase = NounPhrase(noun=noun)
         if self.chance(0.09):
-            name = self.weighted(relations.BEFORE_WEIGHTS)
-            phrase.before.append(self.pick(relations.BEFORE[name]))
+            name = self.weighted(WEIGHTS["rank"])
+            phrase.before.append(self.pick(PHRASES["rank"][name]))
             phrase.conditions.append(Condition(name=name))
         if self.chance(0.3):
             said, conditions = self.adjectives(self.random.choice((1, 1, 1, 2)))
@@ -191,16 +197,16 @@ class PhraseGrammar:
         """A relation to an anchor: near the door; closest to the window; between the desk and the bed."""
         if self.chance(0.04):
             return self._between(depth)
-        name = self.weighted(relations.WEIGHTS)
+        name = self.weighted(WEIGHTS["relation"])
         if self.chance(0.05) and name in ("near", "on", "under", "above", "front", "behind", "closest"):
             return self._shared_relation(name)
-        built = name in relations.BUILT and self.chance(0.15)
-        text, thing = self.anchor(depth + 1, noun=self.random.choice(relations.BUILT[name]) if built else "")
+        built = name in PHRASES["building_anchor"] and self.chance(0.15)
+        text, thing = self.anchor(depth + 1, noun=self.random.choice(PHRASES["building_anchor"][name]) if built else "")
         ordinal = 0
-        said = self.pick(relations.PLACED[name]).format(text)
+        said = self.pick(PHRASES["relation"][name]).format(text)
         if CONDITIONS[name].number == "may" and self.chance(0.05):
             ordinal = self.random.choice((2, 2, 3))
-            said = f"{self.random.choice(words.ORDINALS[ordinal])} {said.removeprefix('the ').removeprefix('that is ')}"
+            said = f"{self.random.choice(ORDINALS[ordinal])} {said.removeprefix('the ').removeprefix('that is ')}"
         negated = self.chance(0.05 if CONDITIONS[name].kind == "rank" else 0.09)
         return self._phrase(said, Condition(name=name, things=(thing,), number=ordinal, negated=negated), anchored=True)
 
@@ -211,7 +217,7 @@ class PhraseGrammar:
         joined = self.random.choice(("{} and {}", "{} and {}", "both {} and {}", "{} and also {}")).format(
             first, second
         )
-        said = self.pick(relations.PLACED[name]).format(joined)
+        said = self.pick(PHRASES["relation"][name]).format(joined)
         phrase = self._phrase(said, Condition(name=name, things=(one,)), anchored=True)
         phrase.conditions.append(Condition(name=name, things=(other,)))
         return phrase
@@ -221,7 +227,7 @@ class PhraseGrammar:
         if self.chance(0.3):
             noun = self.plural(self.noun())
             number = self.random.choice((0, 2, 2))
-            said = f"{self.random.choice(words.NUMBERS[2])} " if number else ""
+            said = f"{self.random.choice(NUMBERS[2])} " if number else ""
             counted = (Condition(name="count", number=2),) if number else ()
             things: tuple[Thing, ...] = (Thing(noun=noun, conditions=counted),)
             return self._phrase(f"{opening} the {said}{noun}", Condition(name="between", things=things), anchored=True)
@@ -236,11 +242,11 @@ class PhraseGrammar:
         if self.chance(0.14):
             name = self.random.choice(("leftmost", "leftmost", "rightmost", "rightmost", "backmost", "frontmost"))
             number = self.random.choice((1, 2, 2, 2, 3, 3, 4))
-            ordinal = self.pick(words.ORDINALS[number]) if number > 1 else self.random.choice(("first", "1st"))
-            said = f"{ordinal} {self.pick(relations.SIDES[name])}"
+            ordinal = self.pick(ORDINALS[number]) if number > 1 else self.random.choice(("first", "1st"))
+            said = f"{ordinal} {self.pick(PHRASES['row_side'][name])}"
             return self._phrase(said, Condition(name=name, number=number if number > 1 else 0))
-        name = self.weighted(relations.BARE_WEIGHTS)
-        return self._phrase(self.pick(relations.BARE[name]), Condition(name=name, negated=self.chance(0.05)))
+        name = self.weighted(WEIGHTS["position"])
+        return self._phrase(self.pick(PHRASES["position"][name]), Condition(name=name, negated=self.chance(0.05)))
 
     def _phrase(self, said: str, condition: Condition, anchored: bool = False) -> Phrase:
         """The phrase after a noun with or without "that is", and after a verb."""
@@ -250,10 +256,7 @@ class PhraseGrammar:
             behind = f"that is {no}{said.removeprefix('that ').removeprefix('is ')}" if no else said
             verb = f"one {behind}" if not said.startswith("that is ") else f"{no}{said.removeprefix('that is ')}"
             return Phrase(behind, verb, [condition], anchored)
-        opening = "" if self.chance(0.72) else self.random.choice(
-            ("that is ", "which is ", "that's ", "located ", "sitting ", "standing ", "thats ", "that are ",
-            "placed ", "situated ")
-        )  # fmt: skip
+        opening = "" if self.chance(0.72) else self.random.choice(TEMPLATES["relative_clauses"])
         if said.startswith(("the ", "first", "second", "third", "fourth", "fifth", "1st", "2nd", "3rd")):
             opening = opening if opening.startswith(("that", "which")) else ""
         return Phrase(f"{opening}{no}{said}", f"{no}{said}", [condition], anchored)
@@ -263,29 +266,20 @@ class PhraseGrammar:
         negated = self.chance(0.15)
         if self.chance(0.08) and not negated:
             text, thing = self.anchor(MAX_DEPTH, simple=True)
-            said = self.pick(relations.HOLDING).format(text)
+            said = self.pick(TEMPLATES["holding"]).format(text)
             return Phrase(said, f"one {said}", [Condition(name="holds", things=(thing,))])
-        name = self.weighted(relations.HAVING_WEIGHTS)
-        template = self.pick(relations.HAVING[name])
+        name = self.weighted(WEIGHTS["possession"])
+        template = self.pick(PHRASES["possession"][name])
         texts, things = zip(
             *(self.anchor(MAX_DEPTH, simple=True) for _ in range(2 if self.chance(0.15) else 1)), strict=True
         )
         joined = self.random.choice((" and ", " and ", " or ") if negated else (" and ", ", and ")).join(texts)
         said = template.format(joined)
         conditions = [Condition(name=name, things=(thing,), negated=negated) for thing in things]
-        position = said.removeprefix("the ").removeprefix("a ").removeprefix("an ")
-        if negated:
-            text = self.random.choice((
-                f"without {said}", f"that does not have {said}", f"with no {position}", f"that doesn't have {said}",
-                f"that has no {position}",
-            ))  # fmt: skip
-            verb = self.random.choice((f"does not have {said}", f"has no {position}", f"doesn't have {said}"))
-        else:
-            text = self.random.choice((
-                f"with {said}", f"with {said}", f"that has {said}", f"which has {said}", f"that have {said}",
-                f"having {said}",
-            ))  # fmt: skip
-            verb = self.random.choice((f"has {said}", f"has {said}", f"is the one with {said}"))
+        without_article = said.removeprefix("the ").removeprefix("a ").removeprefix("an ")
+        form = "has_not" if negated else "has"
+        text = self.random.choice(TEMPLATES[form]).format(said, without_article)
+        verb = self.random.choice(TEMPLATES[f"{form}_verb"]).format(said, without_article)
         return Phrase(text, "|" + verb, conditions)  # nothing stands behind its things: what follows is the target's
 
 

@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 from placegraph.nodes.grounding.program import ANYTHING, SAME_KIND, Condition, Thing
-from placegraph.tools.training.request_grammar import relation_phrases as relations
-from placegraph.tools.training.request_grammar import vocabulary as words
 from placegraph.tools.training.request_grammar.context_grammar import ContextGrammar
 from placegraph.tools.training.request_grammar.phrase_grammar import NounPhrase, Phrase, PhraseGrammar, fitting_article
+from placegraph.tools.training.request_grammar.phrase_tables import (
+    NUMBERS,
+    ORDINALS,
+    PHRASES,
+    TEMPLATES,
+    WEIGHTS,
+    WORDS,
+)
 
-OPENERS = (
-    "find {}", "choose {}", "select {}", "pick {}", "click {}", "locate {}", "look for {}", "show me {}", "go to {}",
-    "take me to {}", "bring me to {}", "point to {}", "you want {}", "i am looking for {}", "we are looking for {}",
-    "please find {}", "where is {}", "where are {}", "can you find {}", "could you show me {}", "i need {}",
-    "i want {}",
-    "help me find {}", "please choose {}", "it is {}", "it's {}", "its {}", "this is {}", "they are {}", "i am {}",
-    "the correct one is {}", "the one you want is {}", "we want {}", "your target is {}", "do you know where {} is",
-    "tell me where {} is", "can you bring me {}", "fetch {}", "get me {}", "guide me to {}", "lead me to {}",
-    "looking for {}",
-    "there is {}", "there's {}",
-    "where can i find {}", "the object is {}", "pick out {}", "identify {}", "what we are looking for is {}",
-    "drive to {}",
-)  # fmt: skip
-SUBJECTS = (
-    "the {}", "this {}", "the correct {}", "the {} we are looking for", "the {} you want",
-    "the {} you are looking for",
-    "the {} in question", "that {}", "the right {}", "the {} you want to pick", "the {} to choose",
-    "the {} you need to select",
-    "the target {}",
-)  # fmt: skip
 CLASHING = (
     {"leftmost", "rightmost", "nth", "middle"}, {"largest", "smallest", "tallest", "shortest",
     "longest"}, {"highest", "lowest"},
@@ -38,8 +24,8 @@ CLASHING = (
 def _contradicts(new: list[Condition], said: list[Condition]) -> bool:
     """Whether nobody would say both of one thing: the left one on the right."""
     names = {condition.name for condition in said}
-    position = {condition.name for condition in new if not condition.things}
-    return any(position & group and names & group for group in CLASHING) or bool(position & names)
+    unanchored = {condition.name for condition in new if not condition.things}
+    return any(unanchored & group and names & group for group in CLASHING) or bool(unanchored & names)
 
 
 class SentenceGrammar:
@@ -67,7 +53,7 @@ class SentenceGrammar:
             text, conditions = self._afterthought(phrase)
         else:
             text, conditions = self._noun_phrase_request(phrase)
-        text, conditions = self.around.relation(text, conditions)
+        text, conditions = self.around.add_place(text, conditions)
         text, conditions = self.around.add_viewpoint(text, conditions)
         return self.around.add_fillers(text), Thing(noun=phrase.noun, conditions=tuple(conditions))
 
@@ -86,8 +72,8 @@ class SentenceGrammar:
             at = 0 if say.chance(0.15) else len(phrase.before)
             phrase.before[at:at] = said
             phrase.conditions[at:at] = conditions
-        position = not phrase.conditions
-        count = say.random.choices((0, 1, 2, 3), (0.04, 1, 0.33, 0.06) if position else (0.45, 1, 0.2, 0.03))[0]
+        is_bare = not phrase.conditions
+        count = say.random.choices((0, 1, 2, 3), (0.04, 1, 0.33, 0.06) if is_bare else (0.45, 1, 0.2, 0.03))[0]
         for _ in range(count):
             luck = say.random.random()
             behind = say.position() if luck < 0.27 else say.possession() if luck < 0.41 else say.relation(0)
@@ -99,18 +85,18 @@ class SentenceGrammar:
 
     def _rank_before(self, phrase: NounPhrase) -> None:
         say = self.say
-        name = say.weighted(relations.BEFORE_WEIGHTS)
+        name = say.weighted(WEIGHTS["rank"])
         if _contradicts([Condition(name=name)], phrase.conditions):
             return
-        word = say.pick(relations.BEFORE[name])
+        word = say.pick(PHRASES["rank"][name])
         luck = say.random.random()
         if luck < 0.06 and name not in ("middle", "alone"):
             number = say.random.choice((2, 2, 3))
-            phrase.before.append(f"{say.random.choice(words.ORDINALS[number])} {word}")
+            phrase.before.append(f"{say.random.choice(ORDINALS[number])} {word}")
             phrase.conditions.append(Condition(name=name, number=number))
         elif luck < 0.12:
             number = say.random.choice((1, 2, 3, 4))
-            phrase.before.append("first" if number == 1 else say.random.choice(words.ORDINALS[number]))
+            phrase.before.append("first" if number == 1 else say.random.choice(ORDINALS[number]))
             phrase.conditions.append(Condition(name="nth", number=number))
         elif luck < 0.2 and name in ("closest", "farthest"):
             text, thing = say.anchor(1)
@@ -128,9 +114,7 @@ class SentenceGrammar:
         say, conditions = self.say, []
         for i, phrase in enumerate(behind):
             if anchored:
-                link = say.random.choice(
-                    (", ", " and ", ", and ", " and is ", ", it is ", " and it's ", " , ", " but ", ". it is ")
-                )
+                link = say.random.choice(TEMPLATES["links_after_anchor"])
                 if phrase.text.startswith(("that ", "which ")):  # after a comma these would refer to the anchor
                     link = say.random.choice((" and ", ", and ", " and is "))
                 verb = link.rstrip().endswith(("is", "it's"))
@@ -155,7 +139,7 @@ class SentenceGrammar:
         if say.chance(0.1) and not phrase.conditions and phrase.behind:
             text = f"which {phrase.noun} is {self._verb(phrase.behind[0])}" if len(phrase.behind) == 1 else text
         elif say.chance(0.55):
-            text = say.pick(OPENERS).format(text)
+            text = say.pick(TEMPLATES["openers"]).format(text)
         return text, [*phrase.conditions, *conditions]
 
     @staticmethod
@@ -167,7 +151,7 @@ class SentenceGrammar:
         say = self.say
         if not phrase.behind:
             phrase.behind.append(say.relation(0))
-        subject = say.pick(SUBJECTS).format(phrase.head)
+        subject = say.pick(TEMPLATES["subjects"]).format(phrase.head)
         first = phrase.behind[0]
         verb = first.predicate.removeprefix("|") if first.predicate.startswith("|") else self._is(first.predicate)
         conditions = [*phrase.conditions, *first.conditions]
@@ -189,18 +173,7 @@ class SentenceGrammar:
             or first.text.startswith(("that", "which"))
         ):
             first = say.relation(0)
-        link = say.random.choice(
-            (
-                ", the ",
-                " , it is the ",
-                ", it's the ",
-                " the ",
-                ", this ",
-                ", choose the ",
-                ", there is a ",
-                ", pick the ",
-            )
-        )
+        link = say.random.choice(TEMPLATES["links_after_relation"])
         text, conditions = self._joined(f"{first.predicate}{link}{phrase.head}", phrase.behind)
         return text, [*first.conditions, *phrase.conditions, *conditions]
 
@@ -209,7 +182,7 @@ class SentenceGrammar:
         say = self.say
         several = say.plural(phrase.noun)
         number = say.random.choice((0, 2, 2, 2, 3, 3, 3, 4, 5, 6))
-        counted = f"{say.random.choice(words.NUMBERS[number])} " if number else ""
+        counted = f"{say.random.choice(NUMBERS[number])} " if number else ""
         count = [Condition(name="count", number=number)] if number else []
         article = say.random.choice(("the ", "the ", "these ", "") if number else ("the ", "the ", "these "))
         phrase.noun = several
@@ -230,23 +203,12 @@ class SentenceGrammar:
                 *count,
                 *conditions,
             ]
-        opening = say.random.choice(
-            ("of", "out of", "in a row of", "among", "there are", "from", "looking at", "in the group of")
-        )
+        opening = say.random.choice(TEMPLATES["group_openings"])
         opening = (
             "of" if opening in ("in a row of", "there are", "in the group of", "looking at") and not number else opening
         )
         article = "" if opening in ("in a row of", "there are") else article
-        one = say.random.choice(
-            (
-                ", the {} one",
-                ", it is the {} one",
-                " the {} one",
-                ". the {} one",
-                ", choose the {} one",
-                ", this is the {} one",
-            )
-        )
+        one = say.random.choice(TEMPLATES["one_of_group"])
         if opening == "there are":
             one = one.replace(" the {}", " pick the {}") if one.startswith(" the") else one
         return f"{opening} {article}{counted}{several}{one.format(before)}{behind}", [*count, *first, *conditions]
@@ -257,31 +219,23 @@ class SentenceGrammar:
         text, conditions = self._joined(f"the {phrase.head}", phrase.behind)
         said, adjectives = say.adjectives(say.random.choice((1, 1, 2)))
         adjective = " ".join(said)
-        tail = say.random.choice((
-            ", the {} one", ". it is {}", ". it's {}", ", which is {}", ". the {} one", " that is {}",
-            ", it's the {} one", ", {} in color"
-        ))  # fmt: skip
+        tail = say.random.choice(TEMPLATES["afterthoughts"])
         if tail.startswith(" that") and phrase.behind:
             tail = ", the {} one"
         if tail.endswith("color"):
-            said, adjectives = [say.pick(words.COLORS)], []
+            said, adjectives = [say.pick(WORDS["colors"])], []
             adjectives = [Condition(name="is", words=said[0])]
             adjective = said[0]
         elif len(said) > 1 and "one" not in tail:
             adjective = " and ".join(said)
-        text = say.pick(OPENERS).format(text) if say.chance(0.3) else text
+        text = say.pick(TEMPLATES["openers"]).format(text) if say.chance(0.3) else text
         return text + tail.format(adjective), [*phrase.conditions, *conditions, *adjectives]
 
     def _purpose_request(self) -> tuple[str, Thing]:
         say = self.say
-        purpose = say.pick(words.PURPOSES)
-        opening = say.pick((
-            "something to {}", "find something to {}", "where can i {}", "i want to {}", "i need something to {}",
-            "a place to {}",
-            "where could i {}", "something i can use to {}", "i would like to {}", "is there anything to {}",
-            "help me {}",
-        ))  # fmt: skip
-        text, conditions = self.around.relation(opening.format(purpose), [Condition(name="for", words=purpose)])
+        purpose = say.pick(WORDS["purposes"])
+        opening = say.pick(TEMPLATES["purposes"])
+        text, conditions = self.around.add_place(opening.format(purpose), [Condition(name="for", words=purpose)])
         return self.around.add_fillers(text), Thing(noun=ANYTHING, conditions=tuple(conditions))
 
     def _what_request(self) -> tuple[str, Thing]:
@@ -290,9 +244,7 @@ class SentenceGrammar:
         phrase = say.relation(0)
         while phrase.conditions[0].negated or phrase.text.startswith(("that", "which")):
             phrase = say.relation(0)
-        opening = say.pick(("what is {}", "what's {}", "the thing {}", "the object {}", "find the thing {}",
-        "something {}",
-                            "which object is {}", "is there anything {}", "show me what is {}"))  # fmt: skip
+        opening = say.pick(TEMPLATES["what"])
         return self.around.add_fillers(opening.format(phrase.predicate)), Thing(
             noun=ANYTHING, conditions=tuple(phrase.conditions)
         )

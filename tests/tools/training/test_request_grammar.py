@@ -7,7 +7,7 @@ from placegraph.nodes.grounding.program_syntax import format_program, parse_prog
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.tools.training.request_grammar import examples
 from placegraph.tools.training.request_grammar.phrase_grammar import PhraseGrammar, is_held_out
-from placegraph.tools.training.request_grammar.vocabulary import FURNITURE
+from placegraph.tools.training.request_grammar.phrase_tables import WORDS
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_every_condition_and_every_depth_is_drawn(coarse_mask):
 
 
 def test_held_out_nouns_are_never_said_in_training(coarse_mask):
-    held = [noun for noun in FURNITURE[3:] if is_held_out(noun) and " " in noun]
+    held = [noun for noun in WORDS["furniture"][3:] if is_held_out(noun) and " " in noun]
     assert held
     words = [" ".join(tokens(example.text)) for example in coarse_mask]
     assert not [noun for noun in held for text in words if re.search(rf"\b{noun}\b", text)]
