@@ -123,7 +123,7 @@ def test_a_folder_without_a_map(cli, tmp_path) -> None:
 def test_a_map_of_another_version(cli, mapped, tmp_path) -> None:
     (tmp_path / "graph.json").write_text('{"version": 99, "nodes": []}')
     done = cli("ask", tmp_path, "chair")
-    assert (done.code, done.reason) == (1, f"{tmp_path / 'graph.json'}: expected graph version 2, found 99")
+    assert (done.code, done.reason) == (1, f"{tmp_path / 'graph.json'}: version: expected graph version 2, found 99")
     shutil.copy(mapped / "graph.json", tmp_path / "graph.json")
     (tmp_path / "run.json").write_text('{"config": {"nodes": {"grounding": {}}, "walls": 1}}')
     done = cli("ask", tmp_path, "chair")
