@@ -95,10 +95,7 @@ class Dataflow:
 
     def awaited_consumers(self, name: str) -> dict[str, list[str]]:
         """For each kind that a node produces, by name: the consumers it waits for."""
-        return {
-            kind.__name__: [c for c in self.consumers(kind) if kind not in self.nodes[c].feedback]
-            for kind in self.nodes[name].outputs
-        }
+        return {kind.__name__: self.consumers(kind) for kind in self.nodes[name].outputs}
 
 
 def build(config: RunConfig, out_dir: Path | None = None) -> Dataflow:
@@ -131,14 +128,11 @@ def _order(nodes: dict[str, Node]) -> list[str]:
     feeds: dict[str, set[str]] = {name: set() for name in sorted(nodes)}
     for name, consumer in nodes.items():
         for kind in consumer.inputs:
-            if kind not in consumer.feedback:
-                feeds[name] |= {producer for producer, node in nodes.items() if kind in node.outputs}
+            feeds[name] |= {producer for producer, node in nodes.items() if kind in node.outputs}
     try:
         return list(graphlib.TopologicalSorter(feeds).static_order())
     except graphlib.CycleError as error:
-        raise ConfigError(
-            f"the dataflow has a cycle that no node declares as feedback: {' -> '.join(error.args[1])}"
-        ) from None
+        raise ConfigError(f"the dataflow has a cycle: {' -> '.join(error.args[1])}") from None
 
 
 def _check_wiring(dataflow: Dataflow) -> None:
@@ -148,7 +142,7 @@ def _check_wiring(dataflow: Dataflow) -> None:
             raise ConfigError(f"{kind.__name__} is produced by {' and '.join(producers)}: switch one of them off")
     for name, node in dataflow.nodes.items():
         for kind in node.inputs:
-            needed = kind not in PRODUCED_BY_SHELL and kind not in node.feedback and kind not in node.optional
+            needed = kind not in PRODUCED_BY_SHELL and kind not in node.optional
             if needed and dataflow.producer(kind) is None:
                 raise ConfigError(
                     f"{name} needs {kind.__name__}, which no node produces: add {_possible_producers(kind)}"

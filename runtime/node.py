@@ -35,9 +35,6 @@ class Node:
     config_type: ClassVar[type[NodeConfig]] = NodeConfig
     inputs: tuple[type[Message], ...] = ()  # set on the class; in __init__ only where they depend on settings
     outputs: tuple[type[Message], ...] = ()
-    # Inputs that come from further down the dataflow. Their producer does not wait for this node, or the cycle would
-    # block; without these edges the dataflow has no cycle (checked when it is built).
-    feedback: ClassVar[tuple[type[Message], ...]] = ()
     optional: tuple[type[Message], ...] = ()  # inputs that no node needs to produce
     restartable: ClassVar[bool] = False  # live: started again after a crash, as it has no state to lose
     # (question kind, answer kind): served as a queryable

@@ -171,7 +171,7 @@ class NodeProcess:
             self._publish(output)
             if is_question and isinstance(output, Answer):
                 self._query_server.answer(envelope.sequence, output.json)
-        if not is_question and envelope.kind not in self.node.feedback:
+        if not is_question:
             self._send_receipt(msgpack.packb([envelope.kind.__name__, envelope.sequence]), b"")
 
     def _check_order(self, envelope: Envelope) -> None:

@@ -42,22 +42,22 @@ def node_types() -> dict[str, type[Node]]:
     waiting = sorted(types)
     while waiting:
         for name in waiting:
-            needed = {k for k in types[name].inputs if k not in types[name].feedback}
-            if not any(k in types[other].outputs for k in needed for other in waiting if other != name):
+            producers = [other for other in waiting if other != name]
+            if not any(kind in types[other].outputs for kind in types[name].inputs for other in producers):
                 break
         order.append(name)
         waiting.remove(name)
     return {name: types[name] for name in order}
 
 
-def _names(kinds: tuple[type[Message], ...], feedback: tuple[type[Message], ...] = ()) -> str:
-    return ", ".join(f"{k.__name__} (feedback)" if k in feedback else k.__name__ for k in kinds) or "nothing"
+def _names(kinds: tuple[type[Message], ...]) -> str:
+    return ", ".join(kind.__name__ for kind in kinds) or "nothing"
 
 
 def dataflow_table() -> str:
     """Markdown table of the nodes."""
     rows = ["| node | inputs | outputs |", "|---|---|---|"]
-    rows += [f"| {n} | {_names(t.inputs, t.feedback)} | {_names(t.outputs)} |" for n, t in node_types().items()]
+    rows += [f"| {n} | {_names(t.inputs)} | {_names(t.outputs)} |" for n, t in node_types().items()]
     return "\n".join(rows)
 
 

@@ -2,9 +2,10 @@ from pathlib import Path
 
 import pytest
 
-from placegraph.runtime.config import build, read
+from placegraph.runtime.config import _order, build, read
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import Frame, Keyframe, Pose, Segments
+from placegraph.runtime.node import Context, Node
 
 CAMERA = '[nodes.camera]\nsource = "flat"\n'
 
@@ -91,3 +92,11 @@ def test_order_waits_and_model_folders(tmp_path: Path) -> None:
 
 def test_a_data_set_in_real_time_is_live(tmp_path: Path) -> None:
     assert not build(read(written(tmp_path, CAMERA + "realtime = true"))).context.lossless
+
+
+def test_a_cycle_is_refused_and_named() -> None:
+    first, second = Node(None, Context()), Node(None, Context())
+    first.inputs, first.outputs = (Pose,), (Keyframe,)
+    second.inputs, second.outputs = (Keyframe,), (Pose,)
+    with pytest.raises(ConfigError, match=r"has a cycle: (first|second) -> (first|second) -> (first|second)"):
+        _order({"first": first, "second": second})

@@ -23,7 +23,7 @@ def test_producers_come_before_consumers() -> None:
     types = node_types()
     seen = {kind for node in types.values() if not node.inputs for kind in node.outputs}
     for node in types.values():
-        needed = {k for k in node.inputs if k not in node.feedback} & {k for t in types.values() for k in t.outputs}
+        needed = set(node.inputs) & {k for t in types.values() for k in t.outputs}
         assert needed <= seen | set(node.outputs)
         seen |= set(node.outputs)
 
