@@ -1,4 +1,4 @@
-"""Write what is made from code or data: results.md, commands.md and dataflow.md of docs/, README's headline numbers.
+"""Write what is made from code or data: pages of docs/, README's headline numbers, the changelog's renamed settings.
 
     python docs/generate.py          write them
     python docs/generate.py --check  exit status 1 if one differs from what would be written
@@ -19,23 +19,23 @@ from typing import Any, Literal, get_args
 import typer
 from pydantic import BaseModel, ConfigDict, Field
 
+from placegraph.runtime.renamed_settings import RENAMED_SETTINGS
 from placegraph.tools.cli import app
 from placegraph.tools.graph import dataflow_table, topic_table
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "results"
-README = ROOT / "README.md"
-HEADLINE_START, HEADLINE_END = "<!-- headline: made by docs/generate.py -->", "<!-- end of headline -->"
+README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
 HEADLINES = (  # in README: what, the experiment's id, its value's name
-    ("Five generated houses: trajectory error", "five_trajectory", "ATE rmse"),
-    ("... rooms, F1 at IoU .5", "five_floors_rooms", "rooms F1 at IoU .5"),
-    ("... objects at IoU .25: precision", "five_objects", "precision"),
-    ("... objects at IoU .25: recall", "five_objects", "recall"),
-    ("... questions about the maps, Acc@.25", "five_questions", "Acc@.25"),
+    ("Five generated houses: trajectory, ATE rmse", "five_trajectory", "ATE rmse"),
+    ("Five houses: rooms, F1 at IoU .5", "five_floors_rooms", "rooms F1 at IoU .5"),
+    ("Five houses: objects at IoU .25, precision", "five_objects", "precision"),
+    ("Five houses: objects at IoU .25, recall", "five_objects", "recall"),
+    ("Five houses: questions about the maps, Acc@.25", "five_questions", "Acc@.25"),
     ("Questions about true graphs, exact object", "true_graphs", "exact object"),
     ("Sentences of people read exactly (Nr3D)", "people", "exact program"),
-    ("7-Scenes kitchen: trajectory error", "kitchen_trajectory", "ATE rmse"),
-    ("... end to end on two CPU cores", "kitchen_speed", "end to end, 10 processes"),
+    ("7-Scenes kitchen: trajectory, ATE rmse", "kitchen_trajectory", "ATE rmse"),
+    ("7-Scenes kitchen: end to end on two CPU cores", "kitchen_speed", "end to end, 10 processes"),
     ("One question, median", "latency", "median"),
 )
 WIDTH = 118  # of generated prose; rows of tables may be longer
@@ -291,9 +291,27 @@ def readme_page() -> str:
     for what, entry_id, name in HEADLINES:
         value = values[entry_id, name]
         rows.append([f"[{what}](docs/results.md#{entry_id})", value.shown, value.shown_goal])
-    before, _, rest = README.read_text().partition(HEADLINE_START)
-    _, _, after = rest.partition(HEADLINE_END)
-    return "\n".join([before + HEADLINE_START, *_table(["what", "value", "goal"], rows), HEADLINE_END]) + after
+    return _with_table(README, "headline", ["what", "value", "goal"], rows)
+
+
+def changelog_page() -> str:
+    """CHANGELOG.md with the settings that were renamed."""
+    rows = [[_setting(old), _setting(new)] for old, new in RENAMED_SETTINGS.items()]
+    return _with_table(CHANGELOG, "renamed settings", ["before", "now"], rows)
+
+
+def _setting(path: str) -> str:
+    """`node.table.key` as it stands in a configuration: its table and its key."""
+    node, _, rest = path.partition(".")
+    tables, _, key = rest.rpartition(".")
+    return f"`[nodes.{'.'.join(filter(None, (node, tables)))}] {key}`"
+
+
+def _with_table(path: Path, name: str, columns: list[str], rows: list[list[str]]) -> str:
+    """The text of a file with the table between its two marks of that name replaced."""
+    start, end = f"<!-- {name}: made by docs/generate.py -->", f"<!-- end of {name} -->"
+    before, _, rest = path.read_text().partition(start)
+    return "\n".join([before + start, *_table(columns, rows), end]) + rest.partition(end)[2]
 
 
 PAGES = {
@@ -301,6 +319,7 @@ PAGES = {
     ROOT / "docs/commands.md": commands_page,
     ROOT / "docs/dataflow.md": dataflow_page,
     README: readme_page,
+    CHANGELOG: changelog_page,
 }
 
 
