@@ -38,6 +38,7 @@ HEADLINES = (  # in README: what, the experiment's id, its value's name
     ("7-Scenes kitchen: end to end on two CPU cores", "kitchen_speed", "end to end, 10 processes"),
     ("One question, median", "latency", "median"),
 )
+CODE_WIDTH = 88  # of commands: what the site shows without scrolling
 WIDTH = 118  # of generated prose; rows of tables may be longer
 GOAL = re.compile(r"(<=|>=) (-?[0-9.]+)")
 VALUE_NAMES = {Path: "PATH", int: "N", float: "NUMBER"}
@@ -141,6 +142,8 @@ def results_page() -> str:
             'by" is the commit that wrote the number down, usually the next one.'
         ),
         "",
+        *_table(["machine", "what it is"], [[f"`{key}`", what] for key, what in machines.items()]),
+        "",
         "## Goals that were missed",
         "",
         f"{with_goal - len(missed)} of {with_goal} goals are met. These are not:",
@@ -158,16 +161,16 @@ def results_page() -> str:
         for entry in theme.entries:
             rows = [[v.name, v.shown, v.shown_goal] for v in entry.values]
             columns = ["measure", "value", "goal"] if any(v.goal for v in entry.values) else ["measure", "value"]
-            lines += _experiment(entry, _table(columns, [row[: len(columns)] for row in rows]), machines)
+            lines += _experiment(entry, _table(columns, [row[: len(columns)] for row in rows]))
         for table in theme.tables:
             rows = [[f"{cell:g}" if not isinstance(cell, str) else cell for cell in row] for row in table.rows]
-            lines += _experiment(table, _table(table.columns, rows), machines)
+            lines += _experiment(table, _table(table.columns, rows))
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _experiment(experiment: _Provenance, table: list[str], machines: dict[str, str]) -> list[str]:
+def _experiment(experiment: _Provenance, table: list[str]) -> list[str]:
     commit = "Measured at" if experiment.commit_is == "measured" else "Recorded by"
-    source = f"{commit} commit `{experiment.commit}`, {experiment.date}, on {machines[experiment.machine]}."
+    source = f"{commit} commit `{experiment.commit}`, {experiment.date}, machine `{experiment.machine}`."
     lines = [f"### {experiment.title} {{#{experiment.id}}}", "", *table, ""]
     if experiment.command:
         lines += ["```sh", *(part for line in experiment.command for part in _continued(line)), "```", ""]
@@ -177,7 +180,7 @@ def _experiment(experiment: _Provenance, table: list[str], machines: dict[str, s
 
 def _continued(command: str) -> list[str]:
     """One shell command, with backslashes where it would be too long."""
-    lines = textwrap.wrap(command, WIDTH - 2, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(command, CODE_WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
     return [f"{line} \\" for line in lines[:-1]] + lines[-1:]
 
 
