@@ -10,6 +10,6 @@ for folder in configs models_onnx nodes runtime tools; do  # type checkers canno
 done
 "$PYTHON" -m ruff check --output-format=concise .
 "$PYTHON" -m ruff format --check .
-"$PYTHON" -m mypy build/types/placegraph/{configs,models_onnx,nodes,runtime,tools}
+"$PYTHON" -m mypy build/types/placegraph/{configs,models_onnx,nodes,runtime,tools} docs/generate.py
 "$PYTHON" docs/generate.py --check
 NO_MKDOCS_2_WARNING=1 "$PYTHON" -m mkdocs build --quiet
