@@ -232,7 +232,8 @@ def _argument(parameter: Any) -> str:
 
 def _spelled(parameter: Any) -> str:
     if parameter.param_type_name == "argument":
-        return f"`{_argument(parameter)}`".replace("|", "\\|")
+        name = _argument(parameter)  # a bar would end the cell, and in code an escaped one shows its backslash
+        return f"<code>{name.replace('|', '&#124;')}</code>" if "|" in name else f"`{name}`"
     annotation = parameter.type_descriptor.annotation  # of typer 0.29; list[Path] is a repeatable option
     kind = next(iter(get_args(annotation)), annotation)
     value = "" if kind is bool else f" {parameter.metavar or VALUE_NAMES.get(kind, 'TEXT')}"
