@@ -26,7 +26,13 @@ MAX_README_BYTES = 8192
 MAX_LINE = 120
 FOLDERS = "runtime|nodes|models_onnx|configs|tools|tests|docs|results|examples"
 # Files that branches still to be merged bring. A name here must not exist: take it out when it does.
-AWAITED = {"nodes/naming/"}
+AWAITED = {
+    "nodes/naming/evidence_naming.py",
+    "nodes/naming/prompt_naming.py",
+    "tests/measurements/grounding_answers.py",
+    "tests/measurements/request_parsing.py",
+    "tests/measurements/room_segmentation.py",
+}
 UNPUBLISHED = re.compile(r"METHOD|FACTS|ARCHITECTURE|REAL_MODELS|STYLE\.md|(?<!llama\.cpp )\bissue \d+|README, ")
 
 
@@ -111,6 +117,16 @@ def test_a_missed_goal_is_missed() -> None:
     assert not value(1.0, None)
     assert value(0.7, ">= 0.75") and not value(0.75, ">= 0.75")
     assert value(2, "<= 1") and not value(1, "<= 1")
+
+
+def test_pages_that_code_cites_exist() -> None:
+    for folder in ("configs", "models_onnx", "nodes", "runtime", "tools", "tests", "examples"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for page, anchor in re.findall(r"(docs/\w+\.md)(?:#([\w-]+))?", path.read_text()):
+                assert (ROOT / page).exists(), f"{path}: {page}"
+                headings = re.findall(r"^#+ (.*)", (ROOT / page).read_text(), re.MULTILINE)
+                slugs = {re.sub(r"[^\w -]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+                assert not anchor or anchor in slugs, f"{path}: {page}#{anchor}"
 
 
 @pytest.mark.xfail(strict=True, reason="branches still to be merged take these out; then remove this mark")
