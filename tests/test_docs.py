@@ -33,7 +33,9 @@ AWAITED = {
     "tests/measurements/request_parsing.py",
     "tests/measurements/room_segmentation.py",
 }
-UNPUBLISHED = re.compile(r"METHOD|FACTS|ARCHITECTURE|REAL_MODELS|STYLE\.md|(?<!llama\.cpp )(?<!its )\bissue \d+|README, ")
+UNPUBLISHED = re.compile(
+    r"METHOD|FACTS|ARCHITECTURE|REAL_MODELS|STYLE\.md|README, |(?<!llama\.cpp )(?<!its )\bissue \d+"
+)
 
 
 def generator():
