@@ -1,4 +1,5 @@
-# make demo: set everything up and map a house.  make test: set everything up and run the tests.
+# make demo: set everything up and map a house.  make test: the tests.  make check: lint, format, types, docs.
+# make docs: the documentation as a site in build/site.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -14,7 +15,7 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt
 QUESTIONS = "where is the sofa" "the monitor upstairs" "which chair is closest to the stove" \
     "the lamp on the nightstand" "find the swimming pool"
 
-.PHONY: demo test check clean
+.PHONY: demo test check docs clean
 
 demo: $(VENV)/.installed
 	$(BIN)/placegraph house --seed 9002 --floors 2 --out $(HOUSE) --replace
@@ -33,13 +34,18 @@ test: $(VENV)/.installed-dev
 check: $(VENV)/.installed-dev
 	PYTHON=$(BIN)/python tools/check.sh
 
+docs: $(VENV)/.installed-dev
+	$(BIN)/python docs/generate.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
+	@echo "the site: build/site/index.html"
+
 $(VENV)/.installed: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP_INSTALL) --editable '.[demo]'
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed
-	$(PIP_INSTALL) --editable '.[dev,demo,oak]'
+	$(PIP_INSTALL) --editable '.[dev,demo,docs,oak]'
 	$(PIP_INSTALL) --no-deps spark-dsg  # a test reads our export with it; its plotting packages are not needed
 	touch $@
 

@@ -1,7 +1,6 @@
-"""The shape of the code: rings, one importer for each outside library, packages, README's tables. (structure)"""
+"""The shape of the code: rings, one importer for each outside library, packages. (structure)"""
 
 import ast
-import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from placegraph.runtime.config import read
-from placegraph.tools.graph import dataflow_table, node_types, topic_table
+from placegraph.tools.graph import node_types
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("configs", "models_onnx", "nodes", "runtime", "tools")
@@ -116,17 +115,6 @@ def test_the_package_list_equals_the_tree() -> None:
 def test_files_stay_short() -> None:
     lengths = {str(p.relative_to(ROOT)): len(p.read_text().splitlines()) for p in sources()}
     assert {name: count for name, count in lengths.items() if count > 300} == {}
-
-
-@pytest.mark.parametrize("table", [dataflow_table, topic_table])
-def test_readme_tables_are_those_of_the_code(table) -> None:
-    assert table() in (ROOT / "README.md").read_text(), f"run `placegraph graph` and copy its table: {table.__name__}"
-
-
-def test_readme_names_only_files_and_commands_that_exist() -> None:
-    text = (ROOT / "README.md").read_text()
-    for name in re.findall(r"`((?:runtime|nodes|models_onnx|configs|tools|tests)/[\w/.-]+)`", text):
-        assert (ROOT / name).exists(), name
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "configs").glob("*.toml")), ids=lambda path: path.name)

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The checks that CI runs: lint, format, types. PYTHON names the interpreter of an environment with the dev extra.
+# The checks that CI runs: lint, format, types, documentation. PYTHON names the interpreter of an environment with the
+# extras dev and docs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PYTHON="${PYTHON:-python}"
@@ -9,4 +10,6 @@ for folder in configs models_onnx nodes runtime tools; do  # type checkers canno
 done
 "$PYTHON" -m ruff check --output-format=concise .
 "$PYTHON" -m ruff format --check .
-"$PYTHON" -m mypy build/types/placegraph/{configs,models_onnx,nodes,runtime,tools}
+"$PYTHON" -m mypy build/types/placegraph/{configs,models_onnx,nodes,runtime,tools} docs/generate.py
+"$PYTHON" docs/generate.py --check
+NO_MKDOCS_2_WARNING=1 "$PYTHON" -m mkdocs build --quiet
