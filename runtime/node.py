@@ -101,7 +101,7 @@ def plugin(package: str, name: str, export: str, what: str) -> Any:
             raise
         package_name = error.name.split(".")[0]
         extra = EXTRAS.get(package_name)
-        hint = f"pip install 'placegraph[{extra}]'" if extra else "see the extras in README"
+        hint = f"pip install 'placegraph[{extra}]'" if extra else "see docs/getting_started.md"
         raise ConfigError(f"{what} {name!r} needs the package {package_name!r}: {hint}") from error
     exported = getattr(module, export, None)
     if exported is None:

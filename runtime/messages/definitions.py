@@ -235,7 +235,7 @@ class Question(Message):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer(Message):
-    """The reply to a question as canonical JSON (fields in README, "Asking")."""
+    """The reply to a question as canonical JSON (docs/asking.md#reply)."""
 
     question_id: str
     json: str

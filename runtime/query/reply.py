@@ -1,4 +1,4 @@
-"""The reply to a question (README, "Asking"). Every reply fits `Reply`, also one that says why there is no answer."""
+"""The reply to a question (docs/asking.md#reply): every reply fits `Reply`, also one that says why there is none."""
 
 from __future__ import annotations
 

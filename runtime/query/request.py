@@ -1,4 +1,4 @@
-"""What clients send (README, "Asking"): one JSON object, checked against `QuestionRequest`, becomes a Question."""
+"""What clients send (docs/asking.md#request): a JSON object, checked against `QuestionRequest`, becomes a Question."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Object lists of other programs: a JSON list of named boxes, read without any image (README, "Other data").
+"""Object lists of other programs: a JSON list of named boxes, read without any image (docs/asking.md#other-data).
 
     {"objects": [{"id": 7, "tags": ["chair"], "center": [1, 2, 0.5], "size": [0.5, 0.5, 1],
                   "color": "red", "front": [0, 1], "room": "r1"}],
