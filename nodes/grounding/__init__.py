@@ -12,11 +12,11 @@ import numpy as np
 from pydantic import Field
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.answer_fields import error_answer, to_json
 from placegraph.nodes.grounding.llm_parser import default_adapter_path
 from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, Namer
 from placegraph.nodes.grounding.reasoner import Reasoner
+from placegraph.nodes.grounding.reply_builder import failed_reply
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError
 from placegraph.runtime.language.grammar_options import SAFE
 from placegraph.runtime.language.language_model import N_CTX, LanguageModel
@@ -102,14 +102,14 @@ class Grounding(Node):
         try:
             if self._graph is None:
                 raise QueryError("no scene graph has arrived yet")
-            fields = self._reasoner.answer(self._graph, self._revision, question)
+            reply = self._reasoner.answer(self._graph, self._revision, question)
         except (QueryError, ModelError) as error:  # a question always gets a reply
-            fields = error_answer(question, self._revision, str(error))
+            reply = failed_reply(question, self._revision, str(error))
         return Answer(
             frame_id=question.frame_id,
             stamp_ns=question.stamp_ns,
             question_id=question.question_id,
-            json=to_json(fields),
+            json=reply.to_answer_json(),
         )
 
 

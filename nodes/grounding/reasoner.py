@@ -7,12 +7,10 @@ question; the paper's flow, a call per layer, is the mode "deductive".
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from placegraph.nodes.grounding.answer_fields import found, not_in_map
 from placegraph.nodes.grounding.box_arrays import Layout, layout_of
 from placegraph.nodes.grounding.deductive_reasoning import deduce
 from placegraph.nodes.grounding.llm_parser import parse_by_examples, parse_by_model
@@ -21,12 +19,14 @@ from placegraph.nodes.grounding.program import Program, Thing
 from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.nodes.grounding.program_syntax import format_program
 from placegraph.nodes.grounding.ranking import Ranking
+from placegraph.nodes.grounding.reply_builder import ReplyBuilder
 from placegraph.nodes.grounding.rule_parser import check_text, parse_by_rules
 from placegraph.nodes.grounding.search_scope import SearchScope, match_places
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel, prompt
 from placegraph.runtime.language.word_forms import normal_form, tokens
 from placegraph.runtime.messages import Question
+from placegraph.runtime.query.reply import LayerSelection, ProgramParse, Reply
 from placegraph.runtime.query.request import MODES
 from placegraph.runtime.scene_graph import ID_PATTERN, Node, SceneGraph
 
@@ -46,7 +46,7 @@ class ModeResult:
     sure: bool
     reader: str = ""  # "model" or "rules"
     confidence: float | None = None  # of the model's reading, 0..1
-    levels: dict[str, Any] | None = None  # mode "deductive": the ids kept of each level
+    selection: LayerSelection | None = None  # mode "deductive"
 
 
 class Reasoner:
@@ -67,41 +67,32 @@ class Reasoner:
             "deductive": self._answer_deductive,
         }
 
-    def answer(self, graph: SceneGraph, revision: int, question: Question) -> dict[str, Any]:
-        """The answer's fields. Raises QueryError for a question that cannot be answered at all."""
+    def answer(self, graph: SceneGraph, revision: int, question: Question) -> Reply:
+        """Answer a question. Raises QueryError for a question that cannot be answered at all."""
         _check(question)
         calls_before = self._model.calls
         result = self._modes[question.mode](graph, question)
-        return self._build_fields(graph, revision, question, result, calls_before)
+        return self._reply(revision, question, result, calls_before)
 
-    def answer_program(self, graph: SceneGraph, revision: int, question: Question, program: Program) -> dict[str, Any]:
-        """The answer to a question whose program is given. Raises QueryError."""
+    def answer_program(self, graph: SceneGraph, revision: int, question: Question, program: Program) -> Reply:
+        """Answer a question whose program is given. Raises QueryError."""
         calls_before = self._model.calls
-        return self._build_fields(graph, revision, question, self._execute(graph, question, program, ""), calls_before)
+        return self._reply(revision, question, self._execute(graph, question, program, ""), calls_before)
 
-    def _build_fields(
-        self, graph: SceneGraph, revision: int, question: Question, result: ModeResult, calls_before: int
-    ) -> dict[str, Any]:
+    def _reply(self, revision: int, question: Question, result: ModeResult, calls_before: int) -> Reply:
         program, ranking = result.program, result.ranking
-        parse = result.levels
+        parse: ProgramParse | LayerSelection | None = result.selection
         if program:
-            parse = {
-                "text": format_program(program.target),
-                "program": program.model_dump(mode="json"),
-                "confidence": result.confidence,
-                "reader": result.reader,
-            }
-        common = {
-            "question": question.text,
-            "question_id": question.question_id,
-            "parse": parse,
-            "revision": revision,
-            "llm_calls": self._model.calls - calls_before,
-        }
+            parse = ProgramParse(
+                text=format_program(program.target),
+                program=program.model_dump(mode="json"),
+                confidence=result.confidence,
+                reader=result.reader,
+            )
+        builder = ReplyBuilder(question, revision, result.executor, parse, self._model.calls - calls_before)
         if not ranking.candidates:
-            target = program.target if program else Thing()
-            return common | not_in_map(graph, target, ranking, result.executor, self._names)
-        return common | found(graph, ranking, result.executor, question.k, result.sure)
+            return builder.not_in_map(ranking, program.target if program else Thing())
+        return builder.found(ranking, sure=result.sure)
 
     def _answer_by_model(self, graph: SceneGraph, question: Question) -> ModeResult:
         if not self._use_model:  # the reply's `parse` says that the rules read it
@@ -137,8 +128,8 @@ class Reasoner:
             raise QueryError("mode 'deductive' needs the language model, which use_model = false switches off")
         asker = np.asarray(question.viewpoint_world, float)
         executor = ProgramExecutor(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
-        levels, ranking = deduce(self._model, executor, question.text)
-        return ModeResult(None, ranking, executor, ranking.sure, "levels", levels=asdict(levels))
+        selection, ranking = deduce(self._model, executor, question.text)
+        return ModeResult(None, ranking, executor, ranking.sure, "levels", selection=selection)
 
     def _answer_by_rules(self, graph: SceneGraph, question: Question) -> ModeResult:
         return self._execute(graph, question, self.parse(graph, question.text), "rules")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from placegraph.runtime.bus.session import Request
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
-from placegraph.runtime.query.reply import error_reply, finished, to_bytes
+from placegraph.runtime.query.reply import Reply, error_reply
 from placegraph.runtime.query.request import asked_id, parse_request
 
 MAX_WAITING = 16
@@ -25,10 +23,10 @@ class _Asker:
     since_s: float  # monotonic
     timer: threading.Timer
 
-    def reply(self, make: Callable[[float], dict[str, Any]]) -> None:
-        """Send what `make` makes of the milliseconds since the request came."""
+    def reply(self, reply: Reply) -> None:
+        """Send a reply with the milliseconds since the request came."""
         self.timer.cancel()
-        self.request.reply(to_bytes(make((time.monotonic() - self.since_s) * 1e3)))
+        self.request.reply(reply.timed((time.monotonic() - self.since_s) * 1e3).to_json().encode())
 
 
 class QueryServer:
@@ -52,7 +50,7 @@ class QueryServer:
             question = parse_request(request.payload, f"Q{number}")
         except QueryError as error:
             ms = (time.monotonic() - began_s) * 1e3
-            request.reply(to_bytes(error_reply(str(error), asked_id(request.payload), ms=ms)))
+            request.reply(error_reply(str(error), asked_id(request.payload)).timed(ms).to_json().encode())
             return
         timer = threading.Timer(self._timeout_s, self._refuse, (number, f"no answer within {self._timeout_s:g} s"))
         timer.daemon = True
@@ -64,7 +62,7 @@ class QueryServer:
             if not reason:
                 self._waiting[number] = asker
         if reason:
-            asker.reply(lambda ms: error_reply(reason, question.question_id, question.text, ms))
+            asker.reply(error_reply(reason, question.question_id, question.text))
             return
         timer.start()
         self._forward(number, question)
@@ -74,13 +72,13 @@ class QueryServer:
         with self._lock:
             asker = self._waiting.pop(number, None)
         if asker is not None:
-            asker.reply(lambda ms: finished(json.loads(answer_json), ms))
+            asker.reply(Reply.model_validate_json(answer_json))
 
     def _refuse(self, number: int, reason: str) -> None:
         with self._lock:
             asker = self._waiting.pop(number, None)
         if asker is not None:
-            asker.reply(lambda ms: error_reply(reason, asker.question.question_id, asker.question.text, ms))
+            asker.reply(error_reply(reason, asker.question.question_id, asker.question.text))
 
     def is_waiting(self, number: int) -> bool:
         """Whether the asker of a question still waits; after the time limit nobody does, and a step would be wasted."""

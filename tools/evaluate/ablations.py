@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, QueryError, SourceError
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.messages import Question
+from placegraph.runtime.query.reply import Reply, error_reply
 from placegraph.runtime.query.request import make_question
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.evaluate.aligned_map import read_aligned
@@ -93,21 +93,19 @@ class VariantRunner:
         calls, began = self.model.calls, time.perf_counter()
         self._saved_ms, self._saved_calls = 0.0, 0
         try:
-            fields = VARIANTS[variant].answer(self, scene, question)
-        except QueryError:
-            fields = {"status": "error", "object_id": None}
+            reply = VARIANTS[variant].answer(self, scene, question)
+        except QueryError as error:
+            reply = error_reply(str(error))
         ms = (time.perf_counter() - began) * 1e3 + self._saved_ms
-        return GroundingResult(
-            fields["status"], fields["object_id"] or "", self.model.calls - calls + self._saved_calls, ms
-        )
+        return GroundingResult(reply.status, reply.object_id or "", self.model.calls - calls + self._saved_calls, ms)
 
-    def by_mode(self, scene: QuestionScene, question: AskedQuestion, mode: str) -> dict[str, Any]:
+    def by_mode(self, scene: QuestionScene, question: AskedQuestion, mode: str) -> Reply:
         """The answer of one of the product's modes."""
         return self.reasoner.answer(scene.graph, 0, scene.question(question, mode))
 
     def by_program(
         self, scene: QuestionScene, question: AskedQuestion, program: Program, graph: SceneGraph | None = None
-    ) -> dict[str, Any]:
+    ) -> Reply:
         """The answer to a program that is given."""
         return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(question), program)
 
@@ -138,7 +136,7 @@ class Variant:
     """One way to answer, and what it is."""
 
     what: str
-    answer: Callable[[VariantRunner, QuestionScene, AskedQuestion], dict[str, Any]]
+    answer: Callable[[VariantRunner, QuestionScene, AskedQuestion], Reply]
 
 
 VARIANTS: Mapping[str, Variant] = {
