@@ -13,7 +13,7 @@ import numpy as np
 
 from placegraph.nodes.grounding.anchor_matching import Anchors, fits_without_anchor, match_anchors
 from placegraph.nodes.grounding.attributes import appearance_fits
-from placegraph.nodes.grounding.box_arrays import Boxes, Layout
+from placegraph.nodes.grounding.box_arrays import Boxes, Layout, RoomPart
 from placegraph.nodes.grounding.groups import group_fits
 from placegraph.nodes.grounding.name_matching import NameMatch, NameMatcher
 from placegraph.nodes.grounding.program import ANYTHING, SAME_KIND, Condition, Thing
@@ -35,8 +35,9 @@ SURFACE_NAMES = ("wall", "floor", "ceiling")  # never meant by "something", "wha
 GENERIC_NOUNS = ("", ANYTHING, SAME_KIND, "object", "item", "something", "anything")
 SAME_KIND_NOUNS = (SAME_KIND, "other", "rest")
 ROOM_PARTS = {
-    "floor": "floor", "ground": "floor", "wall": "wall", "ceiling": "ceiling", "corner": "corner", "room": "room",
-    "middle": "center", "center": "center", "centre": "center",
+    "floor": RoomPart.FLOOR, "ground": RoomPart.FLOOR, "wall": RoomPart.WALL, "ceiling": RoomPart.CEILING,
+    "corner": RoomPart.CORNER, "room": RoomPart.ROOM, "middle": RoomPart.CENTER, "center": RoomPart.CENTER,
+    "centre": RoomPart.CENTER,
 }  # fmt: skip
 
 
@@ -188,7 +189,9 @@ class ConditionScorer:
             measure,
             number,
             0.0 if condition.name == "middle" else outcome.margin,
-            lambda i: f"{outcome.sentence(peer_of_row[i])}, {condition.name} first" if i in peer_of_row else labels[i],
+            lambda i: (
+                f"{outcome.sentence(peer_of_row[i])}, {condition.name} first" if i in peer_of_row else str(labels[i])
+            ),
             trust=outcome.trust,
             negated=condition.negated,
         )

@@ -18,7 +18,7 @@ from placegraph.nodes.grounding.program import SAME_KIND, Program, Thing
 from placegraph.nodes.grounding.ranking import TIE, Candidate, Ranking
 from placegraph.nodes.grounding.scoring import ScoredCandidates
 from placegraph.nodes.grounding.search_scope import SearchScope, match_places, narrow_scope
-from placegraph.nodes.grounding.viewpoint import ViewpointSelector
+from placegraph.nodes.grounding.viewpoint import ASKER, ROOM_CENTER, ViewpointSelector, ViewpointSource
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
@@ -38,7 +38,7 @@ ENTRANCE_WORDS = frozenset(
 class ReportedViewpoint:
     """The point (3,) in metres, world frame, from which left, right, front and behind were judged, and what it is."""
 
-    source: str  # "asker", "room centre", "place before window O4", "door O2"
+    source: ViewpointSource
     xyz_world: F64
 
 
@@ -69,12 +69,12 @@ class ProgramExecutor:
         viewpoint = self.viewpoints.explicit
         height = float(node.center[2])
         if viewpoint is self.viewpoints.asker and viewpoint is not None:
-            return ReportedViewpoint("asker", self.asker_world)
+            return ReportedViewpoint(ASKER, self.asker_world)
         if viewpoint is not None:
             return ReportedViewpoint(viewpoint.source, self.layout.to_world(np.array([*viewpoint.eye, height])))
         room = self.graph.room_of(node.id)
         center = (self.graph.nodes[room] if room else self.graph.building).center
-        return ReportedViewpoint("room centre", center)
+        return ReportedViewpoint(ROOM_CENTER, center)
 
     def scope(self, target: Thing) -> SearchScope:
         """The part of the graph that the target's place words restrict the search to."""

@@ -8,10 +8,11 @@ z x f. Not as in the paper: who faces a thing stands squarely before it, so f is
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import Boxes, Layout
+from placegraph.nodes.grounding.box_arrays import Boxes, Label, Layout
 from placegraph.runtime.arrays import F64
 
 WALL_M = 0.5  # departs: what stands so close to a wall has its back to it
@@ -28,6 +29,32 @@ ROW_ASIDE_M = 0.3  # departs: a row through the room's middle has no side on whi
 HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before the bed
 
 
+class ViewpointKind(Enum):
+    """Where a viewer stands; the value is its wording, with the things it refers to."""
+
+    ASKER = "asker"
+    ROOM_CENTER = "room centre"
+    AT = "{}"
+    BEFORE = "place before {}"  # facing it
+    FRONT = "front of {}"  # facing the front that the map knows
+    BACK_TO = "{} in the back"
+
+
+@dataclass(frozen=True)
+class ViewpointSource:
+    """What a viewpoint was taken from: its kind, and the things that it refers to."""
+
+    kind: ViewpointKind
+    things: tuple[Label, ...] = ()
+
+    def __str__(self) -> str:
+        """The wording in replies: `asker`, `place before window O4`."""
+        return self.kind.value.format(", ".join(map(str, self.things)))
+
+
+ASKER, ROOM_CENTER = ViewpointSource(ViewpointKind.ASKER), ViewpointSource(ViewpointKind.ROOM_CENTER)
+
+
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
     """A position `eye` (2,) in metres and a forward unit vector (2,), both in the building's frame.
@@ -35,7 +62,7 @@ class Viewpoint:
     forward: None when the viewer turns to whatever is judged. trust: 0..1, lower when nobody named a viewpoint.
     """
 
-    source: str  # "asker", "room centre", "one who faces window O4"
+    source: ViewpointSource
     eye: F64
     forward: F64 | None = None
     trust: float = 1.0
@@ -45,11 +72,11 @@ class Viewpoint:
 
 @dataclass(frozen=True, eq=False)
 class LinesOfSight:
-    """Lines of sight to m things: forward (m, 2) unit vectors, eye (m, 2) m, sources in words, trust (m,) 0..1."""
+    """Lines of sight to m things: forward (m, 2) unit vectors, eye (m, 2) m, sources, trust (m,) 0..1."""
 
     forward: F64
     eye: F64
-    sources: tuple[str, ...]
+    sources: tuple[ViewpointSource, ...]
     trust: F64
 
     @property
@@ -68,7 +95,7 @@ class ViewpointSelector:
         self.asker: Viewpoint | None = None
         if np.isfinite(asker_world).all():
             heading = np.array([np.cos(heading_rad), np.sin(heading_rad)]) if np.isfinite(heading_rad) else None
-            self.asker = Viewpoint("asker", asker_world[:2], heading)
+            self.asker = Viewpoint(ASKER, asker_world[:2], heading)
 
     @property
     def explicit(self) -> Viewpoint | None:
@@ -79,7 +106,7 @@ class ViewpointSelector:
         """The line of sight to each anchor."""
         middle = self.layout.room_center(anchors.room)
         forward, eye = anchors.center[:, :2] - middle, middle
-        sources, trust = ["room centre"] * len(anchors), np.full(len(anchors), MIDDLE_TRUST)
+        sources, trust = [ROOM_CENTER] * len(anchors), np.full(len(anchors), MIDDLE_TRUST)
         viewpoint = self.explicit
         if viewpoint is not None:
             viewpoints = [self._nearest_to_room(viewpoint, int(room)) for room in anchors.room]
@@ -93,7 +120,7 @@ class ViewpointSelector:
                 if np.isfinite(anchors.front[j]).all():
                     forward[j], trust[j] = -anchors.front[j], 1.0
                     eye[j] = anchors.center[j, :2] + 2.0 * anchors.front[j]
-                    sources[j] = f"front of {anchors.labels[j]}"
+                    sources[j] = ViewpointSource(ViewpointKind.FRONT, (anchors.labels[j],))
                 else:
                     forward[j] = self.facing_direction(anchors, j)
         return LinesOfSight(_unit(forward), eye, tuple(sources), trust)
@@ -119,12 +146,12 @@ class ViewpointSelector:
             return Viewpoint(faced.source, faced.eye, faced.forward, HINT_TRUST)
         eye = self.layout.room_center(np.array([room]))[0]
         whole = Boxes(
-            ("them",), ("",), targets.low.min(axis=0, keepdims=True), targets.high.max(axis=0, keepdims=True),
+            (Label("the targets"),), targets.low.min(axis=0, keepdims=True), targets.high.max(axis=0, keepdims=True),
             np.zeros(1), np.full((1, 2), np.nan), np.array([room]),
         ) if len(targets) else None  # fmt: skip
         forward = self.facing_direction(whole, 0) if whole is not None else np.array([0.0, 1.0])
         # in the middle of them: look along +y, so that left is -x as on a map
-        return Viewpoint("room centre", eye, forward if forward.any() else np.array([0.0, 1.0]), MIDDLE_TRUST)
+        return Viewpoint(ROOM_CENTER, eye, forward if forward.any() else np.array([0.0, 1.0]), MIDDLE_TRUST)
 
     def facing_direction(self, things: Boxes, j: int) -> F64:
         """(2,) forward direction of one who stands in the room squarely before thing j; 0 at the room's very centre."""
@@ -141,7 +168,7 @@ class ViewpointSelector:
         edge = np.where(directions > 0, high - center, low - center)
         steps = np.where(np.abs(directions) > 0.3, edge / np.where(np.abs(directions) > 0.3, directions, 1), np.inf)
         free = steps.min(axis=1) - half
-        is_long_faced = things.labels[j].rsplit(" ", 1)[0] in LONG_FACED
+        is_long_faced = things.labels[j].name in LONG_FACED
         broad = (long if is_long_faced else ~long) * (ratio >= (LONG_ENOUGH if is_long_faced else ELONGATED))
         if not broad.any() and (free > WALL_M).all():
             return from_room / length if length > 0.05 else np.zeros(2)
@@ -156,9 +183,8 @@ class ViewpointSelector:
         center = things.center[0, :2]
         room = self.layout.room_center(things.room[:1])[0]
         away = max(float((center - room) @ forward), float(np.abs(forward) @ things.size[0, :2]) / 2 + 1.0)
-        return Viewpoint(
-            f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None
-        )
+        source = ViewpointSource(ViewpointKind.BEFORE, things.labels[:1])
+        return Viewpoint(source, center - forward * away, forward if forward.any() else None)
 
     def in_front_of_most(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who faces several things ("the windows"): towards the wall that most of them are on."""
@@ -183,17 +209,20 @@ class ViewpointSelector:
             return None
         forward = np.round(axes[:, 0]) * np.sign(across)
         across = float((middle - room) @ forward)
-        return Viewpoint(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
+        source = ViewpointSource(ViewpointKind.BEFORE, things.labels)
+        return Viewpoint(source, middle - forward * max(abs(across), 1.0), forward)
 
     def with_back_to(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who turns the back to the first of some things."""
         forward = -self.facing_direction(things, 0)
-        return Viewpoint(f"{things.labels[0]} in the back", things.center[0, :2], forward if forward.any() else None)
+        source = ViewpointSource(ViewpointKind.BACK_TO, things.labels[:1])
+        return Viewpoint(source, things.center[0, :2], forward if forward.any() else None)
 
     def at(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who stands at a thing and turns to what is judged; of several, at the room's own."""
         viewpoints = [
-            Viewpoint(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))
+            Viewpoint(ViewpointSource(ViewpointKind.AT, (label,)), things.center[j, :2], z_m=float(things.low[j, 2]))
+            for j, label in enumerate(things.labels)
         ]
         return Viewpoint(viewpoints[0].source, viewpoints[0].eye, others=tuple(viewpoints))
 

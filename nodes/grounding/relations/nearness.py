@@ -84,7 +84,7 @@ def evaluate(query: RelationQuery) -> PairFits:
     if query.relation == "near":
         values = decay(gap, NEAR_M)
     else:
-        shells = np.array([not one for one in anchors.ids], bool)[None]  # the walls of a room's box
+        shells = anchors.is_part()[None]  # the walls of a room's box
         values = np.where(shells, decay(horizontal_distance_m(gaps), WALL_M), decay(gap, AGAINST_M))
     return PairFits(values, lambda i, j: f"{query.targets.labels[i]} is {gap[i, j]:.2f} m from {anchors.labels[j]}")
 

@@ -53,7 +53,7 @@ def _center(query: RelationQuery) -> PairFits:
     else:
         middle = query.anchors.center[None, :, :2]
         half = np.maximum(query.anchors.size[None, :, :2] / 2, 0.3)
-        names = list(query.anchors.labels)
+        names = [str(label) for label in query.anchors.labels]
     aside = np.abs(center[:, None] - middle)
     share = np.linalg.norm(aside / np.maximum(half, 0.01), axis=2) / np.sqrt(2)
     away = np.linalg.norm(aside, axis=2)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery, axis_gaps_m, distance_m
-from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST, Viewpoint
+from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST, ROOM_CENTER, Viewpoint, ViewpointKind, ViewpointSource
 from placegraph.runtime.arrays import F64
 
 MARGIN_M = 0.1  # departs: peers have no margin; about the error of a box centre from a depth camera
@@ -21,21 +21,25 @@ def _lateral_order(query: RelationQuery, viewpoint: Viewpoint) -> F64:
     offset = query.targets.center[:, :2] - viewpoint.eye
     ahead, left = offset @ viewpoint.forward, offset @ np.array([-viewpoint.forward[1], viewpoint.forward[0]])
     # before a wall or a row the order is that across the line of sight, from a point it is that of the bearings
-    if not len(left) or viewpoint.source.startswith("place before") or not (ahead > 0.3).all():
+    if not len(left) or viewpoint.source.kind is ViewpointKind.BEFORE or not (ahead > 0.3).all():
         return np.asarray(left)
     return np.asarray(np.arctan2(left, ahead) * float(np.linalg.norm(offset, axis=1).mean()))
 
 
 def _viewpoint_at_door(query: RelationQuery) -> Viewpoint | None:
     """The view into the room from its only door: "the back of the room" without a viewpoint is meant from there."""
-    doors = [i for i, label in enumerate(query.layout.all.labels) if label.rsplit(" ", 1)[0] in DOOR_NAMES]
+    doors = [i for i, label in enumerate(query.layout.all.labels) if label.name in DOOR_NAMES]
     rooms = set(query.targets.room.tolist())
     doors = [i for i in doors if int(query.layout.all.room[i]) in rooms]
     if len(doors) != 1 or len(rooms) != 1:
         return None
     door = query.layout.all.take(doors)
     forward = -query.viewpoints.facing_direction(door, 0)
-    return Viewpoint(door.labels[0], door.center[0, :2], forward, MIDDLE_TRUST) if forward.any() else None
+    return (
+        Viewpoint(ViewpointSource(ViewpointKind.AT, door.labels), door.center[0, :2], forward, MIDDLE_TRUST)
+        if forward.any()
+        else None
+    )
 
 
 def evaluate(query: RelationQuery) -> PairFits:
@@ -58,7 +62,7 @@ def evaluate(query: RelationQuery) -> PairFits:
         words = f"m from the {viewpoint.source}"
         return PairFits(-away[:, None], lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {words}", MARGIN_M)
     if query.relation in ("frontmost", "backmost"):
-        if viewpoint.source == "room centre":
+        if viewpoint.source is ROOM_CENTER:
             viewpoint = _viewpoint_at_door(query) or viewpoint
         assert viewpoint.forward is not None
         ahead = (targets.center[:, :2] - viewpoint.eye) @ viewpoint.forward

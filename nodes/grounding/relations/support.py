@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import Boxes
+from placegraph.nodes.grounding.box_arrays import Boxes, RoomPart
 from placegraph.nodes.grounding.relations import (
     PairFits,
     Relation,
@@ -25,7 +25,7 @@ STANDS_SHARE = 0.5  # departs: what stands in the upper half of a box stands on 
 HANGS_M, HANGS_SHARE = 0.1, 0.7  # departs: what touches an upright thing, off its bottom, hangs on it ("on the wall")
 WITHIN_SHARE, ON_SHARE = 0.8, 0.9  # departs: how well what is inside is "on", and what is on top is "in"
 FLOOR_M = 0.1  # departs: the floor of a room's box is as low as the lowest thing in it
-SPOT_M, CORNER_M = 0.02, 0.8  # departs: "in the corner": a corner or middle of a room is no box that holds things
+CORNER_M = 0.8  # departs: "in the corner": a corner or middle of a room is no box that holds things
 OFF_GROUND_M = 0.3
 WALL_M = 0.4  # departs: room boxes end inside the wall or beyond it
 ASIDE_M = 0.3  # departs: a picture hangs above the sofa that it does not overlap; half as likely at this distance
@@ -65,7 +65,7 @@ def under_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
     aside = 0.8 * decay(horizontal_distance_m(gaps), ASIDE_M) * np.clip(0.5 + (apart + MIX_M) / (2 * MIX_M), 0, 1)
     below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * decay(apart, RISE_M)
     # a chair tucked under a desk is mostly before it, and its back rises above the desk's middle
-    legs = np.array([_has_legs(label) for label in anchors.labels], bool)[None]
+    legs = np.array([label.head_noun in ("desk", "table") for label in anchors.labels], bool)[None]
     stands = (targets.low[:, None, 2] - anchors.low[None, :, 2]) < OFF_GROUND_M
     lowered = targets.center[:, None, 2] < anchors.high[None, :, 2]
     return np.maximum(below, TUCKED * legs * stands * lowered * decay(horizontal_distance_m(gaps), TUCKED_M))
@@ -78,21 +78,13 @@ def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
     high = np.minimum((targets.center + half)[:, None], anchors.high[None] + GROWN_M)
     share = np.prod(np.clip(high - low, 0, None), axis=2) / np.prod(2 * half, axis=1)[:, None]
     fit = np.clip(share * 0.5 / INSIDE_SHARE, 0, 1)
-    legs = np.array([_is_open_below(label) for label in anchors.labels], bool)[None]
+    legs = np.array([label.head_noun in OPEN_BELOW for label in anchors.labels], bool)[None]
     raised = np.clip((targets.low[:, None, 2] - anchors.low[None, :, 2]) / (RAISED * anchors.size[None, :, 2]), 0, 1)
     share = np.where(legs, share * raised, share)
     fit = np.where(legs, fit * raised, fit)
-    rooms = np.array([bool(node_id) and node_id[0] == "R" for node_id in anchors.ids], bool)
+    rooms = np.array([label.layer == "room" for label in anchors.labels], bool)
     same = targets.room[:, None] == anchors.room[None]
     return np.where(rooms[None] & (anchors.room >= 0)[None], same.astype(float), np.where(share > 0.95, 1.0, fit))
-
-
-def _has_legs(label: str) -> bool:
-    return label.rsplit(" ", 2)[-2] in ("desk", "table") if " " in label else False
-
-
-def _is_open_below(label: str) -> bool:
-    return label.rsplit(" ", 2)[-2] in OPEN_BELOW if " " in label else False
 
 
 def evaluate(query: RelationQuery) -> PairFits:
@@ -122,9 +114,9 @@ def evaluate(query: RelationQuery) -> PairFits:
 
 def _with_room_parts(targets: Boxes, anchors: Boxes, gaps: F64, values: F64) -> F64:
     """The fits (n, m) of "on" and "in", replaced where the anchor is a wall, floor or corner of a room."""
-    is_room_part = np.array([not node_id for node_id in anchors.ids], bool)
-    is_wall, is_floor = is_room_part & (anchors.size[:, 2] > 1.0), is_room_part & (anchors.size[:, 2] <= FLOOR_M)
-    is_spot = is_room_part & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
+    is_wall = anchors.is_part(RoomPart.WALL, RoomPart.ROOM)
+    is_floor = anchors.is_part(RoomPart.FLOOR, RoomPart.CEILING)
+    is_spot = anchors.is_part(RoomPart.CORNER, RoomPart.CENTER)
     aside_m = horizontal_distance_m(gaps)
     off = targets.low[:, None, 2] - anchors.low[None, :, 2] > OFF_GROUND_M
     above = targets.low[:, None, 2] - anchors.high[None, :, 2] - FLOOR_M
