@@ -17,6 +17,7 @@ from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.place_naming import LOCATION_TYPES, ROOM_TYPES, Namer
 from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.nodes.grounding.reply_builder import failed_reply
+from placegraph.nodes.grounding.settings import GroundingSettings
 from placegraph.runtime.errors import ConfigError, ModelError, QueryError
 from placegraph.runtime.language.grammar_options import SAFE
 from placegraph.runtime.language.language_model import N_CTX, LanguageModel
@@ -34,6 +35,7 @@ class GroundingConfig(NodeConfig):
     seed: int = 0
     name_places: bool = True  # False: rooms and locations stay without names
     use_model: bool = True  # False: no question is put to the language model; what it would decide stays open
+    settings: GroundingSettings = GroundingSettings()  # the numbers of relations, names and scores
     room_types: list[str] = Field(list(ROOM_TYPES))  # lists: what an array in TOML is
     location_types: list[str] = Field(list(LOCATION_TYPES))
 
@@ -60,8 +62,8 @@ class Grounding(Node):
         encode = TextEncoder().encode
         self._namer = Namer(self._model, encode, config.room_types, config.location_types)
         place_types = (*config.room_types, *config.location_types)
-        names = NameMatcher(encode)
-        self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model)
+        names = NameMatcher(encode, config.settings.names)
+        self._reasoner = Reasoner(names, self._model, place_types, use_model=config.use_model, settings=config.settings)
         self._graph: SceneGraph | None = None
         self._revision = -1
 

@@ -161,7 +161,11 @@ class _DeductiveSearch:
 
     def _object(self, node: Node) -> str:
         names = [name for tag in node.tags[:MAX_TAGS] if (name := plain(tag.name))] or [node.layer]
-        color = max(BASIC_COLORS, key=lambda name: color_fit(node, name)) if len(node.color) == 3 else ""
+        color = (
+            max(BASIC_COLORS, key=lambda name: color_fit(node, name, self._executor.settings.appearance))
+            if len(node.color) == 3
+            else ""
+        )
         other_names = f" or {' or '.join(names[1:])}" if names[1:] else ""
         place = self._name(self._graph.nodes[node.parent])
         return ", ".join(part for part in (names[0] + other_names, color, f"in {place}") if part)

@@ -22,6 +22,7 @@ from placegraph.nodes.grounding.ranking import Ranking
 from placegraph.nodes.grounding.reply_builder import ReplyBuilder
 from placegraph.nodes.grounding.rule_parser import check_text, parse_by_rules
 from placegraph.nodes.grounding.search_scope import SearchScope, match_places
+from placegraph.nodes.grounding.settings import DEFAULTS, GroundingSettings
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel, prompt
 from placegraph.runtime.language.word_forms import normal_form, tokens
@@ -53,13 +54,19 @@ class Reasoner:
     """Answers questions about one graph at a time."""
 
     def __init__(
-        self, names: NameMatcher, model: LanguageModel, place_types: Sequence[str], *, use_model: bool
+        self,
+        names: NameMatcher,
+        model: LanguageModel,
+        place_types: Sequence[str],
+        *,
+        use_model: bool,
+        settings: GroundingSettings = DEFAULTS,
     ) -> None:
         """place_types: names of kinds of places; they count as places even when the map has none of that kind."""
         self._names = names
         self._model = model
         self._place_types = frozenset(map(normal_form, place_types))
-        self._use_model = use_model
+        self._use_model, self._settings = use_model, settings
         self._layout: tuple[SceneGraph, Layout] | None = None
         self._modes: dict[str, Callable[[SceneGraph, Question], ModeResult]] = {
             "program": self._answer_by_model,
@@ -127,7 +134,9 @@ class Reasoner:
         if not self._use_model:
             raise QueryError("mode 'deductive' needs the language model, which use_model = false switches off")
         asker = np.asarray(question.viewpoint_world, float)
-        executor = ProgramExecutor(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
+        executor = ProgramExecutor(
+            graph, self._names, asker, question.heading_rad, self._layout_of(graph), self._settings
+        )
         selection, ranking = deduce(self._model, executor, question.text)
         return ModeResult(None, ranking, executor, ranking.sure, "levels", selection=selection)
 
@@ -139,12 +148,14 @@ class Reasoner:
     ) -> ModeResult:
         """Execute a program on the graph; a purpose ("something to sit on") is first turned into a noun."""
         asker = np.asarray(question.viewpoint_world, float)
-        executor = ProgramExecutor(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
+        executor = ProgramExecutor(
+            graph, self._names, asker, question.heading_rad, self._layout_of(graph), self._settings
+        )
         scope = executor.scope(program.target)
         if any(program.target.conditions_named("for")):
             program = self._by_purpose(program, scope)
         ranking = executor.rank(program, scope)
-        tied = ranking.tied()
+        tied = ranking.tied(self._settings.scores.tie)
         if len(tied) > 1:  # the lowest id stands first
             ranking.note(f"{len(tied)} candidates fit equally: {', '.join(candidate.node.id for candidate in tied)}")
         return ModeResult(program, ranking, executor, ranking.sure, reader, confidence)

@@ -81,8 +81,8 @@ class VariantRunner:
 
     def __init__(self, threads: int = 1) -> None:
         self.model = LanguageModel(threads=threads, adapter_path=default_adapter_path())
-        names = NameMatcher(TextEncoder().encode)
-        self.reasoner = Reasoner(names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
+        self.names = NameMatcher(TextEncoder().encode)
+        self.reasoner = Reasoner(self.names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
         self._programs: dict[tuple[str, str], Program] = {}
         self._parse_ms: dict[tuple[str, str], float] = {}  # ms of each parse
         self._saved_ms, self._saved_calls = 0.0, 0

@@ -22,6 +22,7 @@ from placegraph.tools.evaluate.ablations import (
 )
 from placegraph.tools.evaluate.grounding import GroundingResult, grounding_scores
 from placegraph.tools.evaluate.report import number, plain, table
+from placegraph.tools.evaluate.sensitivity import cases_of, sensitivity
 
 HEADS = ("exact id", "Acc@.1", "Acc@.25", "Acc@.5", "Acc@.75", "not in map", "errors", "ms p50", "ms p95", "calls")
 
@@ -37,6 +38,9 @@ def evaluate_grounding(
         str, typer.Option(help=f"With and without what, of: {', '.join(VARIANTS)}.")
     ] = "program,oracle,no relations,flat,rules",
     forms: Annotated[bool, typer.Option("--forms", help="Also by form of question.")] = False,
+    perturb: Annotated[
+        bool, typer.Option("--sensitivity", help="Instead: perturb each number of grounding by 20 %, without a model.")
+    ] = False,
     wrong: Annotated[bool, typer.Option("--wrong", help="Print what the first variant answers wrong.")] = False,
     threads: Annotated[int, typer.Option(min=1, help="Threads of the language model.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
@@ -44,6 +48,9 @@ def evaluate_grounding(
     """Ask questions of houses whose one right answer is known, of their true graphs or of maps of them."""
     scenes = _scenes(maps or [], source or [], houses, count)
     runner = VariantRunner(threads)
+    if perturb:
+        _print_sensitivity(scenes, runner)
+        return
     scores: dict[str, dict[str, Any]] = {}
     for i, variant in enumerate(chosen_variants(variants)):
         replies = [[runner.ask(variant, scene, asked) for asked in scene.questions] for scene in scenes]
@@ -56,6 +63,17 @@ def evaluate_grounding(
         if as_json
         else _text(scores, forms, "exact" if houses else "acc_0.25")
     )
+
+
+def _print_sensitivity(scenes: Sequence[QuestionScene], runner: VariantRunner) -> None:
+    if not all(scene.true_ids for scene in scenes):
+        raise ConfigError("--sensitivity needs true graphs: --houses A-B")
+    cases = cases_of(scenes, runner)
+    right, rows = sensitivity(cases, runner.names)
+    heads = [f"{len(cases)} programs, {right:.4f} right", "value", "changed -20 %", "+20 %", "right -20 %", "+20 %"]
+    rows.sort(key=lambda row: -sum(row.changed))
+    body = [[r.name, f"{r.value:g}", *map(str, r.changed), *(f"{share:.4f}" for share in r.right)] for r in rows]
+    print(table([heads, *body]))
 
 
 def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> list[QuestionScene]:
