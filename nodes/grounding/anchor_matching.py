@@ -55,8 +55,8 @@ class Anchors:
         return Anchors(self.boxes.take(rows), self.weights[:max_count], self.trust, self.count, self.is_unique)
 
     def best(self, min_weight: float = 0.999) -> Boxes:
-        """The candidates with at least this weight; by default those as good as the best."""
-        return self.boxes.take(np.flatnonzero(self.weights >= min_weight))
+        """The candidates with at least this weight, but always the best; by default those as good as the best."""
+        return self.boxes.take(np.flatnonzero(self.weights >= min(min_weight, self.weights.max(initial=0.0))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import HOLDS
 from placegraph.nodes.grounding.relations.extent import length_m, log_size
 from placegraph.nodes.grounding.settings import AppearanceSettings
+from placegraph.nodes.grounding.word_lists import word_list, word_table
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.scene_graph import Node
@@ -28,19 +29,10 @@ BASIC_COLORS: dict[str, tuple[int, int, int]] = {
     "green": (40, 130, 50), "blue": (40, 70, 180), "yellow": (235, 215, 40), "orange": (240, 140, 30),
     "brown": (115, 75, 40), "pink": (235, 150, 175), "purple": (120, 50, 140), "beige": (220, 205, 170),
 }  # fmt: skip
-COLORS = {name: name for name in BASIC_COLORS} | {
-    "grey": "gray", "silver": "gray", "violet": "purple", "lilac": "purple", "golden": "yellow", "gold": "yellow",
-    "tan": "beige", "cream": "beige", "navy": "blue", "turquoise": "blue", "teal": "green", "maroon": "red",
-    "burgundy": "red", "crimson": "red", "olive": "green", "lime": "green", "magenta": "pink", "rose": "pink",
-    "khaki": "beige", "ivory": "white", "charcoal": "gray", "chestnut": "brown",
-}  # fmt: skip
-SIZES = {
-    "big": "large", "large": "large", "huge": "large", "giant": "large", "massive": "large", "small": "small",
-    "little": "small", "tiny": "small", "mini": "small", "tall": "tall", "high": "tall", "short": "short",
-    "low": "short", "long": "long", "wide": "long", "narrow": "narrow", "slim": "narrow", "thin": "narrow",
-}  # fmt: skip
+COLORS: dict[str, str] = word_table("colors")
+SIZES: dict[str, str] = word_table("sizes")
 SHADES = {"dark": -1.0, "darker": -1.0, "deep": -1.0, "light": 1.0, "lighter": 1.0, "pale": 1.0, "bright": 0.0}
-FILLER_WORDS = frozenset(("color", "colour", "colored", "coloured", "in", "with", "a", "very", "mostly", "kind", "of"))
+FILLER_WORDS = frozenset(word_list("appearance_filler"))
 
 
 @dataclass(frozen=True, eq=False)

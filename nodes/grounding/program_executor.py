@@ -20,16 +20,13 @@ from placegraph.nodes.grounding.scoring import ScoredCandidates
 from placegraph.nodes.grounding.search_scope import SearchScope, match_places, narrow_scope
 from placegraph.nodes.grounding.settings import DEFAULTS, GroundingSettings
 from placegraph.nodes.grounding.viewpoint import ASKER, ROOM_CENTER, ViewpointSelector, ViewpointSource
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
 MAX_LISTED = 50  # departs: candidates told with evidence; no request may ask for more (question.MAX_CANDIDATES)
-ENTRANCE_WORDS = frozenset(
-    ("enter", "entering", "entered", "the", "room", "into", "through", "stepping", "walks", "inside",
-     "entrance", "enters", "entry", "exit", "walk", "walking", "come", "coming", "in", "doorway",
-     "walked", "entered", "step", "outside", "entryway")
-)  # fmt: skip
+ENTRANCE_WORDS = frozenset(word_list("entrance"))
 
 
 @dataclass(frozen=True)

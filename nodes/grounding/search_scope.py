@@ -12,24 +12,12 @@ from placegraph.nodes.grounding.name_matching import NameMatch, NameMatcher
 from placegraph.nodes.grounding.phrase_segmentation import ORDINALS, WHOLE_MAP
 from placegraph.nodes.grounding.program import Condition, Thing
 from placegraph.nodes.grounding.program_syntax import format_program
+from placegraph.nodes.grounding.word_lists import word_table
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 # What rooms of a kind typically hold, the most typical first; used when the map has no room of that name.
-TYPICAL_OBJECTS: dict[str, tuple[str, ...]] = {
-    "bathroom": ("toilet", "bathtub", "shower", "urinal", "bathroom vanity"),
-    "kitchen": ("stove", "refrigerator", "kitchen counter", "kitchen cabinet", "dishwasher"),
-    "bedroom": ("bed", "nightstand"),
-    "living room": ("sofa", "coffee table", "tv"),
-    "office": ("desk", "office chair"),
-    "work area": ("desk", "office chair"),
-    "dining room": ("dining table", "table"),
-    "dining area": ("dining table", "table"),
-    "laundry room": ("washing machine", "clothes dryer"),
-    "sitting area": ("sofa", "armchair"),
-    "cooking area": ("stove",),
-    "sleeping area": ("bed",),
-}
+TYPICAL_OBJECTS: dict[str, list[str]] = word_table("typical_objects")
 
 RankPlaces = Callable[[Thing, Sequence[NameMatch]], list[Node]]
 
@@ -117,7 +105,7 @@ def _is_thing(noun: str, graph: SceneGraph, names: NameMatcher) -> bool:
     return any(match.score >= names.settings.head for match in names.best_matches(noun, graph.layer("object")))
 
 
-def _typical_objects(noun: str, names: NameMatcher) -> tuple[str, ...]:
+def _typical_objects(noun: str, names: NameMatcher) -> Sequence[str]:
     return next(
         (
             things

@@ -14,9 +14,10 @@ import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes, Label, Layout
 from placegraph.nodes.grounding.settings import DEFAULTS, GroundingSettings
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 
-LONG_FACED = ("bed", "couch bed", "bunk bed", "bathtub", "crib")  # faced along their long side, from the foot
+LONG_FACED = word_list("faced_from_their_end")
 MAX_FACED = 50  # departs: more things than this nobody looks at; the best named are asked
 
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery, axis_gaps_m, distance_m
 from placegraph.nodes.grounding.viewpoint import ROOM_CENTER, Viewpoint, ViewpointKind, ViewpointSource
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 
-DOOR_NAMES = ("door", "doorway", "doorframe", "entrance", "door frame")
+DOOR_NAMES = word_list("doors")
 
 
 def _lateral_order(query: RelationQuery, viewpoint: Viewpoint) -> F64:

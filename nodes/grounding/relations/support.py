@@ -19,9 +19,10 @@ from placegraph.nodes.grounding.relations import (
     horizontal_distance_m,
 )
 from placegraph.nodes.grounding.settings import SupportSettings
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 
-OPEN_BELOW = ("table", "desk", "chair", "bed", "bench", "stool", "sofa", "couch", "armchair", "piano", "sink")
+OPEN_BELOW = word_list("open_below")
 
 
 def on_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettings) -> F64:
