@@ -99,7 +99,7 @@ class ConditionScorer:
                 reference = self._apply_relation(scored, condition, target) or reference
         if thing is self.scope.thing:
             for condition in self.scope.hints:
-                self._apply_hint(scored, condition, target, self.settings.scores.typical_object_trust)
+                self._apply_hint(scored, condition, target, self.settings.scores.weak_trust)
         for condition in conditions:
             if condition.kind == "rank":
                 self._apply_rank(scored, condition, target, reference)
@@ -221,7 +221,7 @@ class ConditionScorer:
             matches = matches or match_places(noun, scope.places, self.names)
         room_parts = self.layout.room_parts(ROOM_PARTS[noun]) if noun in ROOM_PARTS else None
         if not matches and room_parts is None:
-            matches, trust = self.names.nearest_matches(noun, scope.objects), self.settings.scores.nearest_name_trust
+            matches, trust = self.names.nearest_matches(noun, scope.objects), self.settings.scores.weak_trust
             if matches:
                 self.ranking.note(f"nothing is called {noun}; {matches[0].tag} is the nearest name")
         parts = [self.score(thing, self.boxes(matches), matches, target)] if matches else []

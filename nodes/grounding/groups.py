@@ -1,6 +1,6 @@
 """Conditions about things of one name: one that stands alone, or is one of a group of so many.
 
-Not in the paper. A group is a connected component of things whose gaps are small; three gap limits are tried.
+Not in the paper. A group is a connected component of things whose gaps are small; two gap limits are tried.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ def group_fits(
         values[rows] = np.maximum(np.clip(measured / settings.alone_m, 0, 1), measured / farthest)
         text = "{}: the nearest of its kind is {:.2f} m away"
     else:
-        sizes = [_group_sizes(gap, limit) for limit in (settings.small_gap_m, settings.gap_m, settings.large_gap_m)]
+        sizes = [_group_sizes(gap, limit) for limit in (settings.gap_m, settings.large_gap_m)]
         fitting = np.any([size == condition.number for size in sizes], axis=0) | (len(rows) == condition.number)
         values[rows] = np.where(fitting, 1.0, HOLDS)
-        text, measured = "{} is in a group of {:.0f}", sizes[1]
+        text, measured = "{} is in a group of {:.0f}", sizes[0]
     words = {int(row): text.format(boxes.labels[row], value) for row, value in zip(rows, measured, strict=True)}
     return values, lambda i: words.get(i, "")
 

@@ -93,7 +93,7 @@ class ProgramExecutor:
         """Of several things to stand at, those that the asker stands at; all of them when there is none such."""
         distances_m = np.linalg.norm(things.center[:, :2] - self.asker_world[:2], axis=1)
         same_storey = np.abs(things.low[:, 2] - self.asker_world[2]) <= self.settings.viewpoint.storey_m
-        rows = np.flatnonzero((distances_m <= self.settings.viewpoint.beside_m) & same_storey)
+        rows = np.flatnonzero((distances_m <= self.settings.viewpoint.at_door_m) & same_storey)
         return things.take(rows) if len(rows) else things
 
     def _conditions(self, scope: SearchScope, ranking: Ranking) -> ConditionScorer:

@@ -84,13 +84,8 @@ class ScoredCandidates:
         reached = min(number, count)  # "the fifth" of three: a misread number, the last comes nearest
         if count:
             reached_value = float(measure[rows][places == reached][0])
-            span = max(float(np.ptp(measure[rows])), 1e-6)
             off = np.abs(measure[rows] - reached_value)
-            runners = (
-                settings.runner_up
-                * (1 - settings.measured_share * off / span)
-                / np.maximum(np.abs(places - reached), 1) ** 0.5
-            )
+            runners = settings.runner_up / np.maximum(np.abs(places - reached), 1) ** 0.5
             values[rows] = np.where(places == reached, 1.0, np.where(off <= margin, settings.level, runners))
             values[rows] *= 1.0 if count >= number else settings.runner_up
         if negated:  # candidates outside the comparison must not gain by the negation

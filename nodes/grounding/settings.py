@@ -45,8 +45,7 @@ class GroupSettings(_Theme):
     """Things alone or in groups of their kind."""
 
     alone_m: float = 2.0  # distance from its kind at which a thing is alone
-    small_gap_m: float = 0.3  # gaps within a group; each of the three may be meant
-    gap_m: float = 0.8
+    gap_m: float = 0.8  # gaps within a group; either of the two may be meant
     large_gap_m: float = 1.5
 
 
@@ -88,10 +87,9 @@ class SupportSettings(_Theme):
 
     half_contact_m: float = 0.15  # gap between a thing and what carries it
     stands_share: float = 0.5  # of the anchor's height; above it a thing stands on the anchor: beds have headboards
-    half_hanging_m: float = 0.1
+    half_touch_m: float = 0.1  # gap to a thing that it hangs on or is a part of
     hanging_fit: float = 0.7  # of "on" for what touches an upright thing off the floor: a picture on the wall
-    inside_is_on: float = 0.8  # how well what is inside is "on"
-    on_is_inside: float = 0.9  # how well what is on top is "in"
+    inside_or_on_fit: float = 0.8  # how well what is inside is "on", and what is on top is "in"
     floor_m: float = 0.1  # a room's box is as low as the lowest thing in it
     off_floor_m: float = 0.3  # a thing whose bottom is higher does not stand on the floor
     half_aside_m: float = 0.3  # a picture hangs above the sofa although they do not overlap
@@ -102,8 +100,7 @@ class SupportSettings(_Theme):
     half_tucked_m: float = 0.2
     raised_share: float = 0.3  # of the height of a table or bed: things in its box stand below it unless so high
     grown_m: float = 0.05  # the anchor's box is grown by the error of its surfaces
-    half_part_m: float = 0.1  # "with" also means a part that touches
-    half_beside_m: float = 0.75  # and what stands beside
+    half_beside_m: float = 0.75  # "with" also means what stands beside
 
 
 class RoomPositionSettings(_Theme):
@@ -120,17 +117,11 @@ class ViewpointSettings(_Theme):
 
     wall_m: float = 0.5  # a thing this close to a wall has its back to it
     elongated: float = 1.4  # ratio of its sides from which on a thing has a broad side that people face
-    elongated_bed: float = 1.1  # of things that people face from their end
-    at_room_m: float = 1.5  # a door belongs to the rooms within this, through the wall
-    beside_m: float = 1.5  # an asker this near to one of several doors means that one
-    storey_m: float = 2.0  # and stands on its floor
+    at_door_m: float = 1.5  # a door belongs to the rooms, and is meant by an asker, within this
+    storey_m: float = 2.0  # height between an asker and a door on the same floor, at most
     same_direction: float = 0.9  # cosine between lines of sight to the same wall
     min_faced: float = 0.9  # score, as a share of the best, of the things that one faces together
-    row_ratio: float = 3.0  # length to width of a row of things that people stand before
-    row_along: float = 0.95  # cosine between a row and a wall
-    row_aside_m: float = 0.3  # a row through the room's centre has no side to stand on
     unstated_trust: float = 0.5  # nobody named a viewpoint: the room's centre is right more often than not
-    reference_trust: float = 0.7  # who says "the left pillow on the bed" stands before the bed
 
 
 class ScoreSettings(_Theme):
@@ -144,11 +135,9 @@ class ScoreSettings(_Theme):
     runner_up: float = 0.45  # of a rank: the thing next to the one meant
     level: float = 0.97  # of a rank: a thing that the margin cannot tell from it
     outranked: float = 0.1  # of a rank: a thing that is not compared
-    measured_share: float = 0.6  # of a runner-up's fit that its distance in the measure takes
     miscount: float = 0.6  # factor for each anchor more or less than the request counts
-    nearest_name_trust: float = 0.5  # of a relation to an anchor that has only the nearest name
+    weak_trust: float = 0.5  # of a relation to the nearest name, or to what a room of that kind typically holds
     anchor_condition_trust: float = 0.3  # of a relation of the only table there is, taken for the target's
-    typical_object_trust: float = 0.5  # "in the bathroom" of a map without rooms: near the toilet
     same_place: float = 0.9  # places whose score is this share of the best are meant together
     much_better: float = 2.0  # factor by which a thing that fails a condition may still precede those that hold
     tie: float = 0.03  # scores closer than this do not tell two things apart

@@ -137,7 +137,7 @@ class ViewpointSelector:
             )
         if reference is not None and len(reference) and reference.ids[0]:
             faced = self.in_front_of(reference.take([0]))
-            return Viewpoint(faced.source, faced.eye, faced.forward, self.settings.viewpoint.reference_trust)
+            return Viewpoint(faced.source, faced.eye, faced.forward, self.settings.viewpoint.unstated_trust)
         eye = self.layout.room_center(np.array([room]))[0]
         whole = Boxes(
             (Label("the targets"),), targets.low.min(axis=0, keepdims=True), targets.high.max(axis=0, keepdims=True),
@@ -166,9 +166,7 @@ class ViewpointSelector:
         steps = np.where(np.abs(directions) > 0.3, edge / np.where(np.abs(directions) > 0.3, directions, 1), np.inf)
         free = steps.min(axis=1) - half
         is_long_faced = things.labels[j].name in LONG_FACED
-        broad = (long if is_long_faced else ~long) * (
-            ratio >= (numbers.elongated_bed if is_long_faced else numbers.elongated)
-        )
+        broad = (long if is_long_faced else ~long) * (is_long_faced or ratio >= numbers.elongated)
         if not broad.any() and (free > numbers.wall_m).all():
             return from_room / length if length > 0.05 else np.zeros(2)
         score = directions @ (from_room / length) if length > 0.05 else np.zeros(4)
@@ -187,31 +185,11 @@ class ViewpointSelector:
 
     def in_front_of_most(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who faces several things ("the windows"): towards the wall that most of them are on."""
-        row = self._in_front_of_row(things)
-        if row is not None:
-            return row
         viewpoints = [self.in_front_of(things.take([j])) for j in range(min(len(things), MAX_FACED))]
         directions = np.array([np.zeros(2) if v.forward is None else v.forward for v in viewpoints])
         return viewpoints[
             int(np.argmax((directions @ directions.T > self.settings.viewpoint.same_direction).sum(axis=1)))
         ]
-
-    def _in_front_of_row(self, things: Boxes) -> Viewpoint | None:
-        """The viewpoint before a row of things in one room, looking across the row; None when they form no row."""
-        if len(things) < 2 or len(set(things.room.tolist())) > 1:
-            return None
-        numbers, centers = self.settings.viewpoint, things.center[:, :2]
-        spread, axes = np.linalg.eigh(np.cov(centers.T))
-        if np.sqrt(spread[1]) < numbers.row_ratio * np.sqrt(max(spread[0], 0.0)) or spread[1] < 1e-6:
-            return None
-        middle, room = centers.mean(axis=0), self.layout.room_center(things.room[:1])[0]
-        across = float((middle - room) @ axes[:, 0])
-        if abs(across) < numbers.row_aside_m or np.abs(axes[:, 0]).max() < numbers.row_along:
-            return None
-        forward = np.round(axes[:, 0]) * np.sign(across)
-        across = float((middle - room) @ forward)
-        source = ViewpointSource(ViewpointKind.BEFORE, things.labels)
-        return Viewpoint(source, middle - forward * max(abs(across), 1.0), forward)
 
     def with_back_to(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who turns the back to the first of some things."""
@@ -238,7 +216,7 @@ class ViewpointSelector:
         places = np.array([[*other.eye, other.z_m] for other in viewpoint.others])
         away = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0), axis=1)
         nearest = viewpoint.others[int(np.argmin(away))]
-        if away.min() <= self.settings.viewpoint.at_room_m:
+        if away.min() <= self.settings.viewpoint.at_door_m:
             return nearest
         return self.asker or replace(nearest, trust=self.settings.viewpoint.unstated_trust)
 

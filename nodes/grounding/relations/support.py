@@ -37,7 +37,7 @@ def on_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettings)
     rests = np.clip(over * 1.25, 0, 1) * np.where(gap > 0, decay(gap, settings.half_contact_m), sunk * above_middle)
     off = (targets.low[:, None, 2] - anchors.low[None, :, 2]) > settings.off_floor_m
     upright = anchors.size[None, :, 2] > targets.size[:, None, 2]
-    hangs = settings.hanging_fit * decay(distance_m(gaps), settings.half_hanging_m) * off * upright
+    hangs = settings.hanging_fit * decay(distance_m(gaps), settings.half_touch_m) * off * upright
     return np.maximum(rests, hangs)
 
 
@@ -91,12 +91,14 @@ def evaluate(query: RelationQuery) -> PairFits:
     if name == "on":
         # a cup within the box of a shelf, rack or counter with a back wall is "on" it, too
         values = np.maximum(
-            on_fit(targets, anchors, gaps, settings), settings.inside_is_on * in_fit(targets, anchors, gaps, settings)
+            on_fit(targets, anchors, gaps, settings),
+            settings.inside_or_on_fit * in_fit(targets, anchors, gaps, settings),
         )
         values = _with_room_parts(query, anchors, gaps, values)
     elif name == "in":
         values = np.maximum(
-            in_fit(targets, anchors, gaps, settings), settings.on_is_inside * on_fit(targets, anchors, gaps, settings)
+            in_fit(targets, anchors, gaps, settings),
+            settings.inside_or_on_fit * on_fit(targets, anchors, gaps, settings),
         )
         values = _with_room_parts(query, anchors, gaps, values)
     elif name == "under":
@@ -108,7 +110,7 @@ def evaluate(query: RelationQuery) -> PairFits:
         if name == "with":
             gap = distance_m(gaps)
             values = np.maximum(
-                values, np.maximum(0.9 * decay(gap, settings.half_part_m), 0.7 * decay(gap, settings.half_beside_m))
+                values, np.maximum(0.9 * decay(gap, settings.half_touch_m), 0.7 * decay(gap, settings.half_beside_m))
             )
     return PairFits(values, lambda i, j: _sentence(query, i, j))
 
