@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from typing import Any
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Answer, Graph, Question
 from placegraph.runtime.node import Context, Node, build_node
-from placegraph.runtime.query.reply import Reply
+from placegraph.runtime.query.reply import reply_json
 from placegraph.runtime.scene_graph.object_list import OwnId
 from placegraph.runtime.scene_graph.object_list_import import load_scene
 from placegraph.tools.map_folder import RUN, find_graph, read_config
@@ -63,7 +64,7 @@ class Answerer:
         ms = (time.monotonic() - began_s) * 1e3
         if not answers:
             raise QueryError("the grounding node gave no answer")
-        return in_own_ids(Reply.model_validate_json(answers[0].json).timed(ms).model_dump(mode="json"), opened.ids)
+        return in_own_ids(json.loads(reply_json(answers[0].json, ms)), opened.ids)
 
     def _read(self, path: Path) -> _Opened:
         scene = load_scene(find_graph(path))

@@ -19,7 +19,7 @@ from placegraph.nodes.grounding.scoring import ScoredCandidates
 from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64, I64, Bool
 
-MAX_ENDS = 16  # departs: of "between": the anchors of each side that are paired
+MAX_ENDS = 16  # anchors of each side of "between" that are paired; bounds the pairs
 UNDAMPED = frozenset(("closest", "farthest", "in", "holds", "with"))  # a wall between counts no further for these
 
 

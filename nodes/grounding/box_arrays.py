@@ -18,7 +18,7 @@ from placegraph.nodes.grounding.axis_alignment import building_yaw, rotated_box,
 from placegraph.runtime.arrays import F64, I64, Bool
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
-SHELL_M = 0.05  # departs: how thick a wall, floor or ceiling is drawn that the map does not hold
+SHELL_M = 0.05  # thickness of a wall, floor or ceiling that the map does not hold; chosen by hand
 
 
 class RoomPart(Enum):

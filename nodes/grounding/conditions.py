@@ -26,7 +26,7 @@ from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
-MAX_PAIRS = 600_000  # departs: of targets and anchors judged at once; bounds memory on large maps
+MAX_PAIRS = 600_000  # pairs of targets and anchors evaluated at once; bounds memory on large maps
 SURFACE_NAMES = ("wall", "floor", "ceiling")  # never meant by "something", "what is under the bed"
 GENERIC_NOUNS = ("", ANYTHING, SAME_KIND, "object", "item", "something", "anything")
 SAME_KIND_NOUNS = (SAME_KIND, "other", "rest")

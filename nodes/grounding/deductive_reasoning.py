@@ -28,11 +28,12 @@ from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.query.reply import LayerSelection
 from placegraph.runtime.scene_graph import Node, id_key
 
-MAX_LISTED = 48  # departs: entries of a level that are shown; more are ranked by name first
-MAX_CONTENTS = 8  # departs: names of what a place holds
-MAX_TAGS = 3  # departs: names of one object
-MAX_TARGETS, MAX_ANCHORS = 12, 8  # departs: of the small graph
-MAX_EDGES = 3  # departs: anchors that a target is compared with, the nearest
+# Chosen by hand, so that a layer fits one call of a small model.
+MAX_LISTED = 48  # entries of a layer that are shown; of more the best by name
+MAX_CONTENTS = 8  # names of what a place holds
+MAX_TAGS = 3  # names of one object
+MAX_TARGETS, MAX_ANCHORS = 12, 8  # of the small graph
+MAX_EDGES = 3  # nearest anchors that a target is compared with
 OTHERS = 0.5  # score of a target that was not chosen; the model gives no numbers
 
 

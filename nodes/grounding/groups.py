@@ -17,7 +17,7 @@ from placegraph.nodes.grounding.relations import HOLDS, axis_gaps_m, distance_m
 from placegraph.nodes.grounding.settings import GroupSettings
 from placegraph.runtime.arrays import F64, I64
 
-MAX_PEERS = 1500  # departs: nobody counts more, and all gaps among them are held at once
+MAX_PEERS = 1500  # things whose gaps are held at once; bounds memory
 
 
 def group_fits(

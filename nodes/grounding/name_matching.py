@@ -15,7 +15,7 @@ from placegraph.runtime.scene_graph import ID_PATTERN, Node
 Encode = Callable[[Sequence[str]], F32]  # texts to (N, D) unit rows; a zero row for an empty text
 
 NEAREST_NAMES = 3
-SLIP_LETTERS = (5, 9)  # departs: words from so many letters on may hold one wrong letter, or two
+MISSPELLED_LETTERS = (5, 9)  # words of at least so many letters may have one wrong letter, or two; chosen by hand
 MAX_KEPT = 50_000  # pairs of words whose likeness is remembered
 
 
@@ -188,7 +188,7 @@ def _heads(text: str) -> list[str]:
 def is_misspelling(noun: str, word: str) -> bool:
     """Whether a noun is a misspelling of a word: one wrong letter, or two in long words."""
     shorter = min(len(noun), len(word))
-    max_edits = 0 if shorter < SLIP_LETTERS[0] else 1 if shorter < SLIP_LETTERS[1] else 2
+    max_edits = 0 if shorter < MISSPELLED_LETTERS[0] else 1 if shorter < MISSPELLED_LETTERS[1] else 2
     if not max_edits or abs(len(noun) - len(word)) > max_edits or noun[0] != word[0]:
         return False
     if noun in synonyms() or noun in kinds():

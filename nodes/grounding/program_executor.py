@@ -25,7 +25,9 @@ from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
-MAX_LISTED = 50  # departs: candidates told with evidence; no request may ask for more (question.MAX_CANDIDATES)
+MAX_LISTED = (
+    50  # candidates with evidence; as many as a request may ask for (MAX_CANDIDATES of runtime/query/request.py)
+)
 ENTRANCE_WORDS = frozenset(word_list("entrance"))
 
 

@@ -31,8 +31,8 @@ from placegraph.runtime.query.reply import LayerSelection, ProgramParse, Reply
 from placegraph.runtime.query.request import MODES
 from placegraph.runtime.scene_graph import ID_PATTERN, Node, SceneGraph
 
-MAX_OPTIONS = 24  # departs: names of things offered for a purpose; each costs the model 30 to 60 ms
-# Confidence below which a reading gives way to the deductive mode. Departs: of 300 requests of people and of phrasings
+MAX_OPTIONS = 24  # names offered for a purpose; each costs the model 30 to 60 ms
+# Confidence below which a reading gives way to the deductive mode. Measured: of 300 requests of people and of phrasings
 # that training never said 5 readings lay below 0.1, none of them right, and above it 82 % were.
 MIN_CONFIDENCE = 0.05
 

@@ -15,8 +15,8 @@ from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.word_forms import normal_form, tokens
 
-MAX_CHARS = 500  # departs: a spoken request is far shorter; longer text is no question and would not fit the model
-MAX_CLAUSES = 4  # departs: relations of one request; people say no more in one breath
+MAX_CHARS = 500  # a spoken request is far shorter, and more would not fit the model's context
+MAX_CLAUSES = 4  # relations of one request; people say no more
 ON_SPOT = ("corner", "center")  # said of the room, or "of" a thing
 PURPOSE_STARTS = word_list("purpose_starts")
 

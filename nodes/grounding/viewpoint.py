@@ -18,7 +18,7 @@ from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 
 LONG_FACED = word_list("faced_from_their_end")
-MAX_FACED = 50  # departs: more things than this nobody looks at; the best named are asked
+MAX_FACED = 50  # things whose lines of sight are compared; bounds the time of "facing the chairs"
 
 
 class ViewpointKind(Enum):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from placegraph.runtime.bus.session import Request
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
-from placegraph.runtime.query.reply import Reply, error_reply
+from placegraph.runtime.query.reply import error_reply, reply_json
 from placegraph.runtime.query.request import asked_id, parse_request
 
 MAX_WAITING = 16
@@ -23,10 +23,14 @@ class _Asker:
     since_s: float  # monotonic
     timer: threading.Timer
 
-    def reply(self, reply: Reply) -> None:
-        """Send a reply with the milliseconds since the request came."""
+    def reply(self, answer_json: str) -> None:
+        """Send an answer with the milliseconds since the request came."""
         self.timer.cancel()
-        self.request.reply(reply.timed((time.monotonic() - self.since_s) * 1e3).to_json().encode())
+        self.request.reply(reply_json(answer_json, (time.monotonic() - self.since_s) * 1e3).encode())
+
+    def refuse(self, reason: str) -> None:
+        """Send the reason why there is no answer."""
+        self.reply(error_reply(reason, self.question.question_id, self.question.text).to_answer_json())
 
 
 class QueryServer:
@@ -50,7 +54,8 @@ class QueryServer:
             question = parse_request(request.payload, f"Q{number}")
         except QueryError as error:
             ms = (time.monotonic() - began_s) * 1e3
-            request.reply(error_reply(str(error), asked_id(request.payload)).timed(ms).to_json().encode())
+            reply = error_reply(str(error), asked_id(request.payload))
+            request.reply(reply_json(reply.to_answer_json(), ms).encode())
             return
         timer = threading.Timer(self._timeout_s, self._refuse, (number, f"no answer within {self._timeout_s:g} s"))
         timer.daemon = True
@@ -62,7 +67,7 @@ class QueryServer:
             if not reason:
                 self._waiting[number] = asker
         if reason:
-            asker.reply(error_reply(reason, question.question_id, question.text))
+            asker.refuse(reason)
             return
         timer.start()
         self._forward(number, question)
@@ -72,13 +77,13 @@ class QueryServer:
         with self._lock:
             asker = self._waiting.pop(number, None)
         if asker is not None:
-            asker.reply(Reply.model_validate_json(answer_json))
+            asker.reply(answer_json)
 
     def _refuse(self, number: int, reason: str) -> None:
         with self._lock:
             asker = self._waiting.pop(number, None)
         if asker is not None:
-            asker.reply(error_reply(reason, asker.question.question_id, asker.question.text))
+            asker.refuse(reason)
 
     def is_waiting(self, number: int) -> bool:
         """Whether the asker of a question still waits; after the time limit nobody does, and a step would be wasted."""

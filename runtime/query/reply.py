@@ -105,17 +105,17 @@ class Reply(_ReplyModel):
             raise ValueError("the object is the first candidate")
         return self
 
-    def to_json(self) -> str:
-        """Canonical JSON with all fields: sorted keys, no spaces; equal replies give equal bytes in UTF-8."""
-        return _canonical(self.model_dump(mode="json"))
-
     def to_answer_json(self) -> str:
         """The JSON of an Answer message: without `ms`, which the server sets, and `error` when there is none."""
         return _canonical(self.model_dump(mode="json", exclude={"ms"} if self.error else {"ms", "error"}))
 
-    def timed(self, ms: float) -> Reply:
-        """The same reply with the milliseconds since its request arrived, which no node knows."""
-        return self.model_copy(update={"ms": round(ms, 1)})
+
+def reply_json(answer_json: str, ms: float) -> str:
+    """The reply that is sent: a node's answer with all fields, and the milliseconds since the request arrived.
+
+    Canonical: sorted keys, no spaces; equal replies give equal bytes in UTF-8.
+    """
+    return _canonical({"error": None} | json.loads(answer_json) | {"ms": round(ms, 1)})
 
 
 def _canonical(fields: dict[str, Any]) -> str:
