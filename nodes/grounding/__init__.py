@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from placegraph.models_onnx.text_encoder import TextEncoder
-from placegraph.nodes.grounding.answer_fields import error_answer, to_json
 from placegraph.nodes.grounding.llm_parser import default_adapter_path
 from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.nodes.grounding.reasoner import Reasoner
+from placegraph.nodes.grounding.reply_builder import failed_reply
+from placegraph.nodes.grounding.settings import GroundingSettings
 from placegraph.runtime.errors import ModelError, QueryError
 from placegraph.runtime.language.language_model import N_CTX, LanguageModel
 from placegraph.runtime.messages import Answer, Message, NamedGraph, Question
@@ -28,6 +29,7 @@ class GroundingConfig(NodeConfig):
     n_ctx: int = N_CTX  # tokens
     seed: int = 0
     use_model: bool = True  # False: no question is put to the language model; what it would decide stays open
+    settings: GroundingSettings = GroundingSettings()  # the numbers of relations, names and scores
 
 
 class Grounding(Node):
@@ -45,7 +47,7 @@ class Grounding(Node):
         self._model = LanguageModel(
             path, adapter_path=adapter, threads=context.threads, n_ctx=config.n_ctx, seed=config.seed
         )
-        self._names = NameMatcher(TextEncoder().encode)
+        self._names = NameMatcher(TextEncoder().encode, config.settings.names)
         self._graph: SceneGraph | None = None
         self._revision = -1
         self._reasoner: Reasoner | None = None  # of the newest graph
@@ -64,7 +66,13 @@ class Grounding(Node):
         if isinstance(message, NamedGraph):
             self._graph = SceneGraph.from_json(message.json, f"NamedGraph of revision {message.revision}")
             self._revision = message.revision
-            self._reasoner = Reasoner(self._names, self._model, message.place_types, use_model=self.config.use_model)
+            self._reasoner = Reasoner(
+                self._names,
+                self._model,
+                message.place_types,
+                use_model=self.config.use_model,
+                settings=self.config.settings,
+            )
             return []
         assert isinstance(message, Question)
         return [self._answer(message)]
@@ -73,14 +81,14 @@ class Grounding(Node):
         try:
             if self._graph is None or self._reasoner is None:
                 raise QueryError("no scene graph has arrived yet")
-            fields = self._reasoner.answer(self._graph, self._revision, question)
+            reply = self._reasoner.answer(self._graph, self._revision, question)
         except (QueryError, ModelError) as error:  # a question always gets a reply
-            fields = error_answer(question, self._revision, str(error))
+            reply = failed_reply(question, self._revision, str(error))
         return Answer(
             frame_id=question.frame_id,
             stamp_ns=question.stamp_ns,
             question_id=question.question_id,
-            json=to_json(fields),
+            json=reply.to_answer_json(),
         )
 
 

@@ -19,10 +19,7 @@ from placegraph.nodes.grounding.scoring import ScoredCandidates
 from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64, I64, Bool
 
-OTHER_ROOM = 0.5  # departs: what is said of two things is meant within one room; through a wall it counts half
-DOUBT_M = 2.0  # departs: how much farther away an anchor counts for a rank that is half as well named
-MISCOUNT = 0.6  # departs: for each thing more or less than was counted
-MAX_ENDS = 16  # departs: of "between": the anchors of each side that are paired
+MAX_ENDS = 16  # anchors of each side of "between" that are paired; bounds the pairs
 UNDAMPED = frozenset(("closest", "farthest", "in", "holds", "with"))  # a wall between counts no further for these
 
 
@@ -58,8 +55,8 @@ class Anchors:
         return Anchors(self.boxes.take(rows), self.weights[:max_count], self.trust, self.count, self.is_unique)
 
     def best(self, min_weight: float = 0.999) -> Boxes:
-        """The candidates with at least this weight; by default those as good as the best."""
-        return self.boxes.take(np.flatnonzero(self.weights >= min_weight))
+        """The candidates with at least this weight, but always the best; by default those as good as the best."""
+        return self.boxes.take(np.flatnonzero(self.weights >= min(min_weight, self.weights.max(initial=0.0))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +95,19 @@ def match_anchors(
     fits = evaluate(query)
     trust *= fits.trust
     if name in ("closest", "farthest"):
-        return _rank_by_distance(fits, weights, is_self, name, trust)
+        return _rank_by_distance(fits, weights, is_self, name, trust, viewpoints.settings.nearness.doubt_m)
     assert query.anchors is not None
     values = np.where(is_self, 0.0, fits.values)
     if name not in UNDAMPED and query.anchors.ids and any(query.anchors.ids):
-        values = values * np.where(in_different_rooms(targets, query.anchors) > 0, OTHER_ROOM, 1.0)
+        values = values * np.where(
+            in_different_rooms(targets, query.anchors) > 0, viewpoints.settings.nearness.other_room, 1.0
+        )
     weighted = values * weights[None]
     best = weighted.argmax(axis=1) if weighted.size else np.zeros(len(targets), np.int64)
     scores = weighted.max(axis=1, initial=0.0)
     if first.count and len(anchors) == 1:
         matching = ((values >= HOLDS) & (weights[None] >= HOLDS)).sum(axis=1)
-        scores = scores * np.power(MISCOUNT, np.abs(matching - first.count))
+        scores = scores * np.power(viewpoints.settings.scores.miscount, np.abs(matching - first.count))
     return TargetFits(scores, _sentences(fits, best, is_self, targets, name), 0.0, trust, fits.known)
 
 
@@ -118,9 +117,11 @@ def fits_without_anchor(query: RelationQuery) -> TargetFits:
     return TargetFits(fits.values[:, 0], lambda i: fits.sentence(i, 0), fits.margin, fits.trust, fits.known)
 
 
-def _rank_by_distance(fits: PairFits, weights: F64, is_self: Bool, name: str, trust: float) -> TargetFits:
+def _rank_by_distance(
+    fits: PairFits, weights: F64, is_self: Bool, name: str, trust: float, doubt_m: float
+) -> TargetFits:
     """Closest and farthest by the distance to the nearest anchor; a less likely anchor counts as farther away."""
-    penalty_m = -DOUBT_M * np.log2(np.maximum(weights, 1e-3))[None]
+    penalty_m = -doubt_m * np.log2(np.maximum(weights, 1e-3))[None]
     distances_m = np.where(is_self, np.inf, np.abs(fits.values) + penalty_m)
     best = distances_m.argmin(axis=1) if distances_m.size else np.zeros(len(distances_m), np.int64)
     nearest = distances_m.min(axis=1, initial=np.inf)

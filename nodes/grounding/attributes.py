@@ -14,7 +14,10 @@ import cv2
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
+from placegraph.nodes.grounding.relations import HOLDS
 from placegraph.nodes.grounding.relations.extent import length_m, log_size
+from placegraph.nodes.grounding.settings import AppearanceSettings
+from placegraph.nodes.grounding.word_lists import word_list, word_table
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.scene_graph import Node
@@ -26,24 +29,10 @@ BASIC_COLORS: dict[str, tuple[int, int, int]] = {
     "green": (40, 130, 50), "blue": (40, 70, 180), "yellow": (235, 215, 40), "orange": (240, 140, 30),
     "brown": (115, 75, 40), "pink": (235, 150, 175), "purple": (120, 50, 140), "beige": (220, 205, 170),
 }  # fmt: skip
-COLORS = {name: name for name in BASIC_COLORS} | {
-    "grey": "gray", "silver": "gray", "violet": "purple", "lilac": "purple", "golden": "yellow", "gold": "yellow",
-    "tan": "beige", "cream": "beige", "navy": "blue", "turquoise": "blue", "teal": "green", "maroon": "red",
-    "burgundy": "red", "crimson": "red", "olive": "green", "lime": "green", "magenta": "pink", "rose": "pink",
-    "khaki": "beige", "ivory": "white", "charcoal": "gray", "chestnut": "brown",
-}  # fmt: skip
-SIZES = {
-    "big": "large", "large": "large", "huge": "large", "giant": "large", "massive": "large", "small": "small",
-    "little": "small", "tiny": "small", "mini": "small", "tall": "tall", "high": "tall", "short": "short",
-    "low": "short", "long": "long", "wide": "long", "narrow": "narrow", "slim": "narrow", "thin": "narrow",
-}  # fmt: skip
+COLORS: dict[str, str] = word_table("colors")
+SIZES: dict[str, str] = word_table("sizes")
 SHADES = {"dark": -1.0, "darker": -1.0, "deep": -1.0, "light": 1.0, "lighter": 1.0, "pale": 1.0, "bright": 0.0}
-FILLER_WORDS = frozenset(("color", "colour", "colored", "coloured", "in", "with", "a", "very", "mostly", "kind", "of"))
-COLOR_FALLOFF = 30.0  # departs: CIELAB distance at which a colour's fit falls to 1/e; a median under room light is dull
-SHADE_L = 20.0  # departs: CIELAB lightness between brown and dark brown
-UNKNOWN_FIT = 0.5  # an object whose colour was not seen neither fits nor fails
-MIN_COLOR_FIT = 0.6  # departs: colour fit from which on an object is called by that colour; below it does not hold
-SIZE_LEAST = 0.4  # departs: the smallest of several is still called large by someone
+FILLER_WORDS = frozenset(word_list("appearance_filler"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +44,9 @@ class AppearanceFits:
     sentences: tuple[str, ...]
 
 
-def appearance_fits(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool) -> AppearanceFits:
+def appearance_fits(
+    words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool, settings: AppearanceSettings
+) -> AppearanceFits:
     """How well each of n nodes fits the words of an `is` condition; among (n,): the nodes whose sizes are compared."""
     content_words = [word for word in tokens(words.replace("-", " ")) if word not in FILLER_WORDS]
     values, known = np.ones(len(nodes)), []
@@ -63,7 +54,7 @@ def appearance_fits(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool
     color = next((COLORS[stem] for word in content_words if (stem := _color_stem(word)) in COLORS), "")
     shade = next((SHADES[word] for word in content_words if word in SHADES), 0.0)
     if color or (shade and len(content_words) == 1):
-        fits, is_known = _colors(nodes, color, shade, content_words)
+        fits, is_known = _colors(nodes, color, shade, content_words, settings)
         values *= fits
         known.append(is_known)
         for i, node in enumerate(nodes):
@@ -79,7 +70,7 @@ def appearance_fits(words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool
             for i in np.flatnonzero(tagged).tolist():
                 notes[i].append(f"{boxes.labels[i]} is tagged {word}")
         elif word in SIZES:
-            fits = size_fit(boxes, SIZES[word], among)
+            fits = size_fit(boxes, SIZES[word], among, settings)
             values *= fits
             known.append(True)
             for i in range(len(nodes)):
@@ -101,44 +92,46 @@ def _is_tagged(node: Node, word: str) -> bool:
     return any(word in tokens(tag.name) for tag in node.tags)
 
 
-def _colors(nodes: Sequence[Node], color: str, shade: float, content_words: Sequence[str]) -> tuple[F64, bool]:
+def _colors(
+    nodes: Sequence[Node], color: str, shade: float, content_words: Sequence[str], settings: AppearanceSettings
+) -> tuple[F64, bool]:
     tagged = np.array(
         [any(_is_tagged(node, word) for word in content_words if _color_stem(word) in COLORS) for node in nodes], bool
     )
     has_color = np.array([len(node.color) == 3 for node in nodes], bool)
-    fits = np.full(len(nodes), UNKNOWN_FIT)
+    fits = np.full(len(nodes), HOLDS)
     if has_color.any():
         lab = _lab([node.color for node in nodes if len(node.color) == 3])
         fits[has_color] = (
-            _color_fits(lab, color, shade) if color else np.clip(0.5 + shade * (lab[:, 0] - 50) / 60, 0, 1)
+            _color_fits(lab, color, shade, settings) if color else np.clip(0.5 + shade * (lab[:, 0] - 50) / 60, 0, 1)
         )
     # scaled so that a fit of MIN_COLOR_FIT becomes 0.5, from which on any condition holds
-    fits = np.where(has_color & (fits < MIN_COLOR_FIT), fits * 0.5 / MIN_COLOR_FIT, fits)
+    fits = np.where(has_color & (fits < settings.min_color_fit), fits * 0.5 / settings.min_color_fit, fits)
     if tagged.any():
         fits = np.where(tagged, 1.0, np.where(has_color, fits, 0.3))
     return fits, bool(has_color.any() or tagged.any())
 
 
-def _color_fits(lab: F64, color: str, shade: float) -> F64:
+def _color_fits(lab: F64, color: str, shade: float, settings: AppearanceSettings) -> F64:
     """(n,) 1 where `color` is the nearest basic colour; "dark" and "light" (shade -1, 1) shift its lightness."""
     names = list(BASIC_COLORS)
     terms = _lab(list(BASIC_COLORS.values()))
     if shade:
-        terms[names.index(color), 0] = np.clip(terms[names.index(color), 0] + shade * SHADE_L, 5, 95)
+        terms[names.index(color), 0] = np.clip(terms[names.index(color), 0] + shade * settings.shade_lightness, 5, 95)
     distances = np.linalg.norm(lab[:, None] - terms[None], axis=2)
     excess = distances[:, names.index(color)] - distances.min(axis=1)
-    return np.asarray(np.exp(-excess / COLOR_FALLOFF))
+    return np.asarray(np.exp(-excess / settings.color_falloff))
 
 
-def color_fit(node: Node, color: str) -> float:
+def color_fit(node: Node, color: str, settings: AppearanceSettings) -> float:
     """How well `color` names an object's median colour, 0..1; 1 when it is the nearest basic colour."""
-    return float(_colors([node], color, 0.0, [color])[0][0])
+    return float(_colors([node], color, 0.0, [color], settings)[0][0])
 
 
-def size_fit(boxes: Boxes, size: str, among: Bool) -> F64:
+def size_fit(boxes: Boxes, size: str, among: Bool, settings: AppearanceSettings) -> F64:
     """(n,) how well large, small, tall, short, long or narrow fits each, by its rank among the others."""
     if size in ("large", "small"):
-        values = log_size(boxes)
+        values = log_size(boxes, settings.short_side)
     elif size in ("tall", "short"):
         values = boxes.size[:, 2]
     else:
@@ -148,7 +141,7 @@ def size_fit(boxes: Boxes, size: str, among: Bool) -> F64:
         return np.ones(len(boxes))
     below = (peers[None] < values[:, None] - 1e-6).sum(axis=1) / (len(peers) - 1)
     share = np.clip(below, 0, 1) if size in ("large", "tall", "long") else np.clip(1 - below, 0, 1)
-    return np.asarray(SIZE_LEAST + (1 - SIZE_LEAST) * share)
+    return np.asarray(settings.min_size_fit + (1 - settings.min_size_fit) * share)
 
 
 def _lab(colors: Sequence[tuple[int, ...]]) -> F64:

@@ -12,8 +12,8 @@ from placegraph.runtime.arrays import F64
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
 STEP_RAD = np.radians(0.25)
-SHARPNESS = 10.0  # departs: a box that lies 12 degrees beside a direction speaks .75 as much for it as one along it
-MIN_RAD = np.radians(1.0)  # departs: less is within the error of the boxes' own directions
+SHARPNESS = 10.0  # a box 12 degrees off a direction votes for it with 0.04 of its weight
+MIN_RAD = np.radians(1.0)  # less is within the error of the boxes' own directions
 
 
 def building_yaw(graph: SceneGraph) -> float:

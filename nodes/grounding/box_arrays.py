@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -17,8 +18,37 @@ from placegraph.nodes.grounding.axis_alignment import building_yaw, rotated_box,
 from placegraph.runtime.arrays import F64, I64, Bool
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
-SHELL_M = 0.05  # departs: how thick a wall, floor or ceiling is drawn that the map does not hold
-PLACES = "BFRL"  # the letters of ids that are places
+SHELL_M = 0.05  # thickness of a wall, floor or ceiling that the map does not hold; chosen by hand
+
+
+class RoomPart(Enum):
+    """A part of a room that people name although the map has no node for it; the value is its wording."""
+
+    ROOM = "room {}"
+    FLOOR = "the floor of room {}"
+    CEILING = "the ceiling of room {}"
+    WALL = "a wall of room {}"
+    CORNER = "a corner of room {}"
+    CENTER = "the middle of room {}"
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a box is: a node with its name, id and layer, or a part of the room whose id is `name`."""
+
+    name: str
+    node_id: str = ""  # "" for a part of a room
+    layer: str = ""
+    part: RoomPart | None = None
+
+    def __str__(self) -> str:
+        """The wording in evidence sentences: `chair O3`, `a corner of room R1`."""
+        return self.part.value.format(self.name) if self.part else f"{self.name} {self.node_id}"
+
+    @property
+    def head_noun(self) -> str:
+        """The last word of a node's name: `table` of a coffee table; "" for a part of a room."""
+        return "" if self.part else self.name.rsplit(" ", 1)[-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +58,7 @@ class Boxes:
     A room of -1 is the building: the box is in no room.
     """
 
-    labels: tuple[str, ...]  # "chair O3"
-    ids: tuple[str, ...]  # "" for a part of a room
+    labels: tuple[Label, ...]
     low: F64
     high: F64
     yaw: F64
@@ -37,7 +66,12 @@ class Boxes:
     room: I64
 
     def __len__(self) -> int:
-        return len(self.ids)
+        return len(self.labels)
+
+    @cached_property
+    def ids(self) -> tuple[str, ...]:
+        """The nodes' ids; "" for a part of a room."""
+        return tuple(label.node_id for label in self.labels)
 
     @cached_property
     def center(self) -> F64:
@@ -52,14 +86,20 @@ class Boxes:
     @cached_property
     def is_place(self) -> Bool:
         """(N,) whether it is a building, floor, room or location."""
-        return np.array([bool(node_id) and node_id[0] in PLACES for node_id in self.ids], bool)
+        return np.array([label.layer not in ("", "object") for label in self.labels], bool)
+
+    def is_part(self, *parts: RoomPart) -> Bool:
+        """(N,) whether it is one of these parts of a room; without arguments: any part."""
+        return np.array(
+            [label.part is not None and label.part in (parts or (label.part,)) for label in self.labels], bool
+        )
 
     def take(self, rows: I64 | Sequence[int]) -> Boxes:
         """The boxes of some rows, in the order given."""
         rows = np.asarray(rows, np.int64)
         listed = rows.tolist()
         return Boxes(
-            tuple(self.labels[i] for i in listed), tuple(self.ids[i] for i in listed), self.low[rows], self.high[rows],
+            tuple(self.labels[i] for i in listed), self.low[rows], self.high[rows],
             self.yaw[rows], self.front[rows], self.room[rows],
         )  # fmt: skip
 
@@ -67,7 +107,7 @@ class Boxes:
 def concatenate(parts: Sequence[Boxes]) -> Boxes:
     """One `Boxes` from one or more."""
     return Boxes(
-        sum((part.labels for part in parts), ()), sum((part.ids for part in parts), ()),
+        sum((part.labels for part in parts), ()),
         *(np.concatenate([getattr(part, name) for part in parts]) for name in ("low", "high", "yaw", "front", "room")),
     )  # fmt: skip
 
@@ -101,42 +141,40 @@ class Layout:
         """(N, 2) centres of rooms by their rows, m."""
         return np.asarray((self.room_low[room, :2] + self.room_high[room, :2]) / 2)
 
-    def room_parts(self, kind: str) -> Boxes:
-        """Parts of all rooms, or of the building when there are none: floor, ceiling, wall, corner, center or room."""
+    def room_parts(self, part: RoomPart) -> Boxes:
+        """All boxes of one part: of every room, or of the building when the graph has no rooms."""
         low, high = (self.room_low[:-1], self.room_high[:-1]) if self.rooms else (self.room_low, self.room_high)
         rows = np.arange(len(low)) if self.rooms else np.array([-1])
-        names = [room.id for room in self.rooms] or ["B0"]
-        parts: list[tuple[int, F64, F64, str]] = []
-        for k, name in enumerate(names):
-            parts += [(int(rows[k]), *box) for box in _room_part_boxes(kind, low[k], high[k], name)]
-        count = len(parts)
+        ids = [room.id for room in self.rooms] or ["B0"]
+        boxes = [_room_part_boxes(part, low[k], high[k]) for k in range(len(ids))]
+        counts = [len(of_room) for of_room in boxes]
+        bounds = np.array([box for of_room in boxes for box in of_room]).reshape(-1, 2, 3)
         return Boxes(
-            tuple(part[3] for part in parts), ("",) * count, np.array([part[1] for part in parts]).reshape(-1, 3),
-            np.array([part[2] for part in parts]).reshape(-1, 3), np.zeros(count), np.full((count, 2), np.nan),
-            np.array([part[0] for part in parts], np.int64),
+            tuple(Label(room_id, part=part) for room_id, of_room in zip(ids, boxes, strict=True) for _ in of_room),
+            bounds[:, 0], bounds[:, 1], np.zeros(len(bounds)), np.full((len(bounds), 2), np.nan),
+            np.repeat(rows, counts),
         )  # fmt: skip
 
 
-def _room_part_boxes(kind: str, low: F64, high: F64, room: str) -> list[tuple[F64, F64, str]]:
-    if kind == "room":
-        return [(low, high, f"room {room}")]
-    if kind == "center":
+def _room_part_boxes(part: RoomPart, low: F64, high: F64) -> list[tuple[F64, F64]]:
+    """Low and high corner of each box of a part, for a room from low to high."""
+    if part is RoomPart.ROOM:
+        return [(low, high)]
+    if part is RoomPart.CENTER:
         middle = (low + high) / 2
-        return [(middle, middle, f"the middle of room {room}")]
-    if kind in ("floor", "ceiling"):
-        z = low[2] if kind == "floor" else high[2] + SHELL_M
-        return [(np.array([*low[:2], z - SHELL_M]), np.array([*high[:2], z]), f"the {kind} of room {room}")]
-    xs, ys = (low[0], high[0]), (low[1], high[1])
-    if kind == "corner":
-        return [
-            (np.array([x, y, low[2]]), np.array([x, y, high[2]]), f"a corner of room {room}") for x in xs for y in ys
-        ]
+        return [(middle, middle)]
+    if part in (RoomPart.FLOOR, RoomPart.CEILING):
+        z = low[2] if part is RoomPart.FLOOR else high[2] + SHELL_M
+        return [(np.array([*low[:2], z - SHELL_M]), np.array([*high[:2], z]))]
+    if part is RoomPart.CORNER:
+        xs, ys = (low[0], high[0]), (low[1], high[1])
+        return [(np.array([x, y, low[2]]), np.array([x, y, high[2]])) for x in xs for y in ys]
     walls = []
     for axis in (0, 1):
         for value, sign in ((low[axis], -1), (high[axis], 1)):
             a, b = low.copy(), high.copy()
             a[axis], b[axis] = sorted((value, value + sign * SHELL_M))
-            walls.append((a, b, f"a wall of room {room}"))
+            walls.append((a, b))
     return walls
 
 
@@ -153,7 +191,7 @@ def layout_of(graph: SceneGraph) -> Layout:
     return Layout(
         nodes=nodes,
         all=Boxes(
-            tuple(f"{node.name} {node.id}" for node in nodes), tuple(node.id for node in nodes),
+            tuple(Label(node.name, node.id, node.layer) for node in nodes),
             boxes[:, 0], boxes[:, 1],
             np.array([node.oriented_box[6] - yaw if node.oriented_box else 0.0 for node in nodes]),
             np.array([node.front or (np.nan, np.nan) for node in nodes]).reshape(-1, 2) @ rotation.T,

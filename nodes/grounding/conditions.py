@@ -13,7 +13,7 @@ import numpy as np
 
 from placegraph.nodes.grounding.anchor_matching import Anchors, fits_without_anchor, match_anchors
 from placegraph.nodes.grounding.attributes import appearance_fits
-from placegraph.nodes.grounding.box_arrays import Boxes, Layout
+from placegraph.nodes.grounding.box_arrays import Boxes, Layout, RoomPart
 from placegraph.nodes.grounding.groups import group_fits
 from placegraph.nodes.grounding.name_matching import NameMatch, NameMatcher
 from placegraph.nodes.grounding.program import ANYTHING, SAME_KIND, Condition, Thing
@@ -26,17 +26,14 @@ from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
-MAX_PAIRS = 600_000  # departs: of targets and anchors judged at once; bounds memory on large maps
-FAIR_TRUST = 0.5  # departs: what is only likely to be called so decides half
-SPARE_TRUST = 0.3  # departs: "the cup on the table near the window" with one table: the cup near the window
-HINT_TRUST = 0.5  # departs: "in the bathroom" of a map without rooms: near the toilet
-SAME_PLACE = 0.9  # departs: places whose score is at least this share of the best are meant together
+MAX_PAIRS = 600_000  # pairs of targets and anchors evaluated at once; bounds memory on large maps
 SURFACE_NAMES = ("wall", "floor", "ceiling")  # never meant by "something", "what is under the bed"
 GENERIC_NOUNS = ("", ANYTHING, SAME_KIND, "object", "item", "something", "anything")
 SAME_KIND_NOUNS = (SAME_KIND, "other", "rest")
 ROOM_PARTS = {
-    "floor": "floor", "ground": "floor", "wall": "wall", "ceiling": "ceiling", "corner": "corner", "room": "room",
-    "middle": "center", "center": "center", "centre": "center",
+    "floor": RoomPart.FLOOR, "ground": RoomPart.FLOOR, "wall": RoomPart.WALL, "ceiling": RoomPart.CEILING,
+    "corner": RoomPart.CORNER, "room": RoomPart.ROOM, "middle": RoomPart.CENTER, "center": RoomPart.CENTER,
+    "centre": RoomPart.CENTER,
 }  # fmt: skip
 
 
@@ -61,7 +58,7 @@ class ConditionScorer:
         ranking: Ranking,
     ) -> None:
         self.graph, self.names, self.layout, self.viewpoints = graph, names, layout, viewpoints
-        self.scope, self.ranking = scope, ranking
+        self.scope, self.ranking, self.settings = scope, ranking, viewpoints.settings
         self._anchors_by_thing: dict[Thing, Anchors | None] = {}
 
     def clear_anchors(self) -> None:
@@ -79,7 +76,7 @@ class ConditionScorer:
         scored = self.score(place, self.boxes(matches), matches, place)
         rank_positions = sorted(range(len(matches)), key=lambda i: (-scored.scores[i], id_key(matches[i].node.id)))
         best = scored.scores[rank_positions[0]]
-        return [matches[i].node for i in rank_positions if scored.scores[i] >= SAME_PLACE * best]
+        return [matches[i].node for i in rank_positions if scored.scores[i] >= self.settings.scores.same_place * best]
 
     def score(self, thing: Thing, boxes: Boxes, matches: Sequence[NameMatch] | None, target: Thing) -> ScoredCandidates:
         """Apply all conditions of a thing to its candidates; ranks last: "the largest near the table" is near it.
@@ -90,7 +87,7 @@ class ConditionScorer:
         nodes: list[Node | None] = [fit.node for fit in matches] if matches else [None] * len(boxes)
         scores = np.array([fit.score for fit in matches]) if matches else np.ones(len(boxes))
         conditions = [condition for condition in thing.conditions if condition.kind in SCORED_KINDS]
-        scored = ScoredCandidates(boxes, nodes, scores, narrowed=bool(conditions))
+        scored = ScoredCandidates(boxes, nodes, scores, self.settings.scores, narrowed=bool(conditions))
         for condition in conditions:
             if condition.kind == "look":
                 self._apply_appearance(scored, condition)
@@ -102,7 +99,7 @@ class ConditionScorer:
                 reference = self._apply_relation(scored, condition, target) or reference
         if thing is self.scope.thing:
             for condition in self.scope.hints:
-                self._apply_hint(scored, condition, target, HINT_TRUST)
+                self._apply_hint(scored, condition, target, self.settings.scores.weak_trust)
         for condition in conditions:
             if condition.kind == "rank":
                 self._apply_rank(scored, condition, target, reference)
@@ -112,7 +109,7 @@ class ConditionScorer:
         nodes = [node for node in scored.nodes if node is not None]
         if len(nodes) < len(scored):
             return
-        appearance = appearance_fits(condition.words, nodes, scored.boxes, scored.peers)
+        appearance = appearance_fits(condition.words, nodes, scored.boxes, scored.peers, self.settings.appearance)
         if not appearance.known:
             self.ranking.note(f"the map does not tell what is {condition.words}")
         if appearance.known or not condition.negated:  # without evidence a negation does not hold either
@@ -120,7 +117,7 @@ class ConditionScorer:
 
     def _apply_group(self, scored: ScoredCandidates, condition: Condition) -> None:
         is_compared = scored.rankable() if condition.name == "count" else scored.peers
-        values, sentence = group_fits(scored.boxes, np.flatnonzero(is_compared), condition)
+        values, sentence = group_fits(scored.boxes, np.flatnonzero(is_compared), condition, self.settings.groups)
         scored.apply_fits(values, sentence, negated=condition.negated)
 
     def _apply_relation(self, scored: ScoredCandidates, condition: Condition, target: Thing) -> Boxes | None:
@@ -152,7 +149,7 @@ class ConditionScorer:
         """
         for condition in anchor.conditions:
             if condition.kind == "relation" and not condition.negated:
-                self._apply_hint(scored, condition, target, SPARE_TRUST)
+                self._apply_hint(scored, condition, target, self.settings.scores.anchor_condition_trust)
 
     def _apply_hint(self, scored: ScoredCandidates, condition: Condition, target: Thing, trust: float) -> None:
         """Raise the scores of what a relation fits, without demanding that it holds."""
@@ -188,7 +185,9 @@ class ConditionScorer:
             measure,
             number,
             0.0 if condition.name == "middle" else outcome.margin,
-            lambda i: f"{outcome.sentence(peer_of_row[i])}, {condition.name} first" if i in peer_of_row else labels[i],
+            lambda i: (
+                f"{outcome.sentence(peer_of_row[i])}, {condition.name} first" if i in peer_of_row else str(labels[i])
+            ),
             trust=outcome.trust,
             negated=condition.negated,
         )
@@ -222,7 +221,7 @@ class ConditionScorer:
             matches = matches or match_places(noun, scope.places, self.names)
         room_parts = self.layout.room_parts(ROOM_PARTS[noun]) if noun in ROOM_PARTS else None
         if not matches and room_parts is None:
-            matches, trust = self.names.nearest_matches(noun, scope.objects), FAIR_TRUST
+            matches, trust = self.names.nearest_matches(noun, scope.objects), self.settings.scores.weak_trust
             if matches:
                 self.ranking.note(f"nothing is called {noun}; {matches[0].tag} is the nearest name")
         parts = [self.score(thing, self.boxes(matches), matches, target)] if matches else []

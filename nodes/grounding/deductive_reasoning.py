@@ -25,25 +25,16 @@ from placegraph.nodes.grounding.rule_parser import check_text
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.language.prompts import safe_name
 from placegraph.runtime.language.word_forms import tokens
+from placegraph.runtime.query.reply import LayerSelection
 from placegraph.runtime.scene_graph import Node, id_key
 
-MAX_LISTED = 48  # departs: entries of a level that are shown; more are ranked by name first
-MAX_CONTENTS = 8  # departs: names of what a place holds
-MAX_TAGS = 3  # departs: names of one object
-MAX_TARGETS, MAX_ANCHORS = 12, 8  # departs: of the small graph
-MAX_EDGES = 3  # departs: anchors that a target is compared with, the nearest
+# Chosen by hand, so that a layer fits one call of a small model.
+MAX_LISTED = 48  # entries of a layer that are shown; of more the best by name
+MAX_CONTENTS = 8  # names of what a place holds
+MAX_TAGS = 3  # names of one object
+MAX_TARGETS, MAX_ANCHORS = 12, 8  # of the small graph
+MAX_EDGES = 3  # nearest anchors that a target is compared with
 OTHERS = 0.5  # score of a target that was not chosen; the model gives no numbers
-
-
-@dataclass(frozen=True)
-class LevelSelection:
-    """The ids that were kept in each layer; the reply's `parse`."""
-
-    floors: tuple[str, ...] = ()
-    rooms: tuple[str, ...] = ()
-    locations: tuple[str, ...] = ()
-    targets: tuple[str, ...] = ()
-    anchors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -58,11 +49,11 @@ class _LevelNodes:
         return sorted({node.id: node for node in (*self.targets, *self.anchors)}.values(), key=lambda n: id_key(n.id))
 
     @property
-    def ids(self) -> tuple[str, ...]:
-        return tuple(node.id for node in self.both)
+    def ids(self) -> list[str]:
+        return [node.id for node in self.both]
 
 
-def deduce(model: LanguageModel, executor: ProgramExecutor, question: str) -> tuple[LevelSelection, Ranking]:
+def deduce(model: LanguageModel, executor: ProgramExecutor, question: str) -> tuple[LayerSelection, Ranking]:
     """The selection of each layer, and the ranking with the chosen object first; empty when the model finds none.
 
     executor: made for the graph and the asker. Raises QueryError when the text is no question, or when a single entry
@@ -81,7 +72,7 @@ class _DeductiveSearch:
         self._question_phrases = _question_phrases(question)
         self._notes: list[str] = ["read level by level (deductive mode)"]
 
-    def run(self) -> tuple[LevelSelection, Ranking]:
+    def run(self) -> tuple[LayerSelection, Ranking]:
         all_floors = self._graph.layer("floor")
         floors = self._narrow("floor", _LevelNodes(all_floors, all_floors))
         rooms = self._narrow("room", _LevelNodes(self._below(floors.targets), self._below(floors.anchors)))
@@ -91,12 +82,12 @@ class _DeductiveSearch:
         anchors = list(things.anchors)[:MAX_ANCHORS]  # may be targets as well: "the chair beside the other chair"
         if len(targets) < len(things.targets):
             self._notes.append(f"of {len(things.targets)} targets the first {len(targets)} were compared")
-        levels = LevelSelection(
+        levels = LayerSelection(
             floors=floors.ids,
             rooms=rooms.ids,
-            locations=tuple(node_id for node_id in places.ids if node_id.startswith("L")),
-            targets=tuple(node.id for node in targets),
-            anchors=tuple(node.id for node in anchors),
+            locations=[node_id for node_id in places.ids if node_id.startswith("L")],
+            targets=[node.id for node in targets],
+            anchors=[node.id for node in anchors],
         )
         return levels, self._ground(targets, anchors)
 
@@ -171,7 +162,11 @@ class _DeductiveSearch:
 
     def _object(self, node: Node) -> str:
         names = [name for tag in node.tags[:MAX_TAGS] if (name := safe_name(tag.name))] or [node.layer]
-        color = max(BASIC_COLORS, key=lambda name: color_fit(node, name)) if len(node.color) == 3 else ""
+        color = (
+            max(BASIC_COLORS, key=lambda name: color_fit(node, name, self._executor.settings.appearance))
+            if len(node.color) == 3
+            else ""
+        )
         other_names = f" or {' or '.join(names[1:])}" if names[1:] else ""
         place = self._name(self._graph.nodes[node.parent])
         return ", ".join(part for part in (names[0] + other_names, color, f"in {place}") if part)

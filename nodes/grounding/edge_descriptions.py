@@ -17,7 +17,7 @@ from placegraph.runtime.vision.geometry import box_distance_m
 # The paper has left, right, front, back, above and below; "on", "in" and "under" are added because people use them.
 SEMANTIC = ("left", "right", "front", "behind", "above", "under", "on", "in")
 OPPOSITE = {"left": "right", "right": "left", "front": "behind", "behind": "front"}
-MARGIN = 0.1  # departs: how much better than its opposite; a relation may fall back on nearness, which both then hold
+MARGIN = 0.1  # by which a relation must fit better than its opposite; both may hold by nearness. Chosen by hand
 WORDS = {"left": "left of", "right": "right of", "front": "in front of"}  # as they read before a noun
 
 

@@ -21,8 +21,8 @@ ADAPTER_FILE = "reader.gguf"
 # What stands before and after a request.
 OPENING = "<|im_start|>request\n"
 CLOSING = "\nprogram:"
-MAX_WORDS = 80  # departs: with punctuation; people need 27 at most (400 requests read), training has up to 60
-REPLY_TOKENS = 96  # departs: 57 are the most of 2,000 generated programs; a reply that does not end costs 2 s at most
+MAX_WORDS = 80  # with punctuation; people need 27 at most (400 requests read), training has up to 60
+REPLY_TOKENS = 96  # the longest of 2,000 generated programs has 57; an endless reply costs 2 s
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,10 @@ from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.language.prompts import fill_prompt
 from placegraph.runtime.language.word_forms import tokens
 
-MAX_REASON = 120  # departs: letters of a reason; a model that does not come to a point must not fill the context
-MAX_CHOSEN = 6  # departs: ids of one list in one reply
-MAX_CALLS = 4  # departs: of one step; what lies beyond is left out, which the evidence says
+# Chosen by hand.
+MAX_REASON = 120  # letters of a reason, so that a rambling model does not fill the context
+MAX_CHOSEN = 6  # ids of one list in one reply
+MAX_CALLS = 4  # of one step; entries beyond are left out, and the evidence says so
 NONE = "none"  # the choice when no entry fits
 
 

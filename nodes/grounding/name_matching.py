@@ -7,21 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from placegraph.nodes.grounding.settings import DEFAULTS, NameSettings
 from placegraph.runtime.arrays import F32
 from placegraph.runtime.language.word_forms import hyponyms, normal_form, synonyms
 from placegraph.runtime.scene_graph import ID_PATTERN, Node
 
 Encode = Callable[[Sequence[str]], F32]  # texts to (N, D) unit rows; a zero row for an empty text
 
-# departs: the steps of fit, in the order people use names
-SAME, KIND, SYNONYM, SLIP, MEMBER, HEAD = 1.0, 0.95, 0.9, 0.88, 0.85, 0.8
-SHARED = 0.03  # departs: of synonyms the one whose word is in the noun is meant more
-COSINE = 0.45  # departs: lowest cosine that counts; see tests/nodes/grounding/test_names.py for the pairs it parts
-FAIR = 0.35  # departs: lowest cosine of a name that is taken, with doubt, where nothing is called so
-TAG_SHARE = 0.2  # departs: a tag with less than this share of the strongest tag's weight is a slip of the detector
-STEP = 0.08  # departs: nodes within this of the best fit are named equally well
 NEAREST_NAMES = 3
-SLIP_LETTERS = (5, 9)  # departs: words from so many letters on may hold one wrong letter, or two
+MISSPELLED_LETTERS = (5, 9)  # words of at least so many letters may have one wrong letter, or two; chosen by hand
 MAX_KEPT = 50_000  # pairs of words whose likeness is remembered
 
 
@@ -37,10 +31,16 @@ class NameMatch:
 class NameMatcher:
     """Compares nouns with tags."""
 
-    def __init__(self, encode: Encode) -> None:
-        self._encode = encode
+    def __init__(self, encode: Encode, settings: NameSettings = DEFAULTS.names) -> None:
+        self._encode, self.settings = encode, settings
         self._similarity: dict[tuple[str, str], float] = {}
         self._rows: dict[str, F32] = {}
+
+    def with_settings(self, settings: NameSettings) -> NameMatcher:
+        """A matcher with other settings and the same encoded words."""
+        matcher = NameMatcher(self._encode, settings)
+        matcher._rows = self._rows
+        return matcher
 
     def similarity(self, noun: str, tag: str) -> float:
         """How well a noun names a thing with this tag, 0..1; 0: not at all. Both may be plural."""
@@ -53,13 +53,13 @@ class NameMatcher:
     def _compare(self, noun: str, tag: str) -> float:
         if not noun or not tag:
             return 0.0
-        by_words = _word_similarity(noun, tag)
+        by_words = _word_similarity(noun, tag, self.settings)
         if by_words:
             return by_words
         if noun.startswith(tag) or tag.startswith(noun):
             return 0.0  # the last part of a compound says what it is: a tablecloth is no table, a bedroom no bed
         cosine = self.cosine(noun, tag)
-        return cosine if cosine >= COSINE else 0.0
+        return cosine if cosine >= self.settings.min_cosine else 0.0
 
     def cosine(self, a: str, b: str) -> float:
         """Cosine of two phrases' embeddings."""
@@ -88,13 +88,12 @@ class NameMatcher:
             return NameMatch(node, float(noun.upper() == node.id), node.id)
         return self._best(noun, node, self.similarity)
 
-    @staticmethod
-    def _best(noun: str, node: Node, similarity: Callable[[str, str], float]) -> NameMatch:
+    def _best(self, noun: str, node: Node, similarity: Callable[[str, str], float]) -> NameMatch:
         best = NameMatch(node, 0.0, "")
         strongest = max((tag.weight for tag in node.tags), default=0.0)
         for tag in node.tags:
             share = tag.weight / strongest if strongest > 0 else 1.0
-            score = similarity(noun, tag.name) * (0.5 + 0.5 * share) if share >= TAG_SHARE else 0.0
+            score = similarity(noun, tag.name) * (0.5 + 0.5 * share) if share >= self.settings.min_tag_share else 0.0
             if score > best.score:
                 best = NameMatch(node, score, tag.name)
         return best
@@ -111,16 +110,20 @@ class NameMatcher:
         self._encode_tags(nodes)
         matches = [self._best(normal_form(noun), node, self._cosine_similarity) for node in nodes]
         best = max((match.score for match in matches), default=0.0)
-        return [match for match in matches if best >= FAIR and match.score >= best - STEP / 2]
+        return [
+            match
+            for match in matches
+            if best >= self.settings.min_nearest_cosine and match.score >= best - self.settings.tie / 2
+        ]
 
     def _cosine_similarity(self, noun: str, tag: str) -> float:
         return max(self.cosine(noun, normal_form(tag)), 0.0)
 
-    def best_matches(self, noun: str, nodes: Sequence[Node], step: float = STEP) -> list[NameMatch]:
-        """The nodes whose score is within `step` of the best score, in the order given."""
+    def best_matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
+        """The nodes whose score is within `tie` of the best, in the order given."""
         matches = self.matches(noun, nodes)
         best = max((match.score for match in matches), default=0.0)
-        return [match for match in matches if match.score >= best - step]
+        return [match for match in matches if match.score >= best - self.settings.tie]
 
     def is_known(self, noun: str, nodes: Iterable[Node]) -> bool:
         """Whether the noun names any of the nodes."""
@@ -136,33 +139,35 @@ class NameMatcher:
         return [names[i] for i in order[:max_count]]
 
 
-def _word_similarity(noun: str, tag: str) -> float:
+def _word_similarity(noun: str, tag: str, settings: NameSettings) -> float:
     """Similarity 0..1 by the words alone, both in normal form; 0 when they have nothing in common."""
     if noun == tag or _one_word(noun) == _one_word(tag):
-        return SAME
+        return settings.same
     if tag.endswith(f" {noun}"):
-        return KIND  # an office chair is a chair
+        return settings.kind  # an office chair is a chair
     if _are_synonyms(noun, tag):
-        return SYNONYM + SHARED * noun.endswith(f" {tag}")  # of a duffel bag: a bag before a backpack
+        return settings.synonym + settings.shared_word_bonus * noun.endswith(
+            f" {tag}"
+        )  # of a duffel bag: a bag before a backpack
     if tag in hyponyms().get(noun, ()):
-        return MEMBER  # a chair is a seat
+        return settings.member  # a chair is a seat
     if is_misspelling(noun, tag):
-        return SLIP
+        return settings.misspelled
     if noun.endswith(f" {tag}"):
-        return HEAD  # a "wooden chair" may be tagged chair
+        return settings.head  # a "wooden chair" may be tagged chair
     best_score = 0.0
     for noun_head in _heads(noun):
         for tag_head in _heads(tag):
             if (noun_head, tag_head) == (noun, tag):
                 continue
-            weight = (HEAD if noun_head != noun else 1.0) * (KIND if tag_head != tag else 1.0)
+            weight = (settings.head if noun_head != noun else 1.0) * (settings.kind if tag_head != tag else 1.0)
             if _are_synonyms(noun_head, tag_head) or (noun_head == tag_head and noun_head != noun and tag_head != tag):
                 # "leather couch" and "green sofa": less, because the words before the heads may contradict each other
-                best_score = max(best_score, weight * (SYNONYM if noun_head != tag_head else 0.9))
+                best_score = max(best_score, weight * (settings.synonym if noun_head != tag_head else 0.9))
             elif tag_head in hyponyms().get(noun_head, ()):
-                best_score = max(best_score, weight * MEMBER)
+                best_score = max(best_score, weight * settings.member)
             elif is_misspelling(noun_head, tag_head):
-                best_score = max(best_score, weight * SLIP)
+                best_score = max(best_score, weight * settings.misspelled)
     return best_score
 
 
@@ -183,7 +188,7 @@ def _heads(text: str) -> list[str]:
 def is_misspelling(noun: str, word: str) -> bool:
     """Whether a noun is a misspelling of a word: one wrong letter, or two in long words."""
     shorter = min(len(noun), len(word))
-    max_edits = 0 if shorter < SLIP_LETTERS[0] else 1 if shorter < SLIP_LETTERS[1] else 2
+    max_edits = 0 if shorter < MISSPELLED_LETTERS[0] else 1 if shorter < MISSPELLED_LETTERS[1] else 2
     if not max_edits or abs(len(noun) - len(word)) > max_edits or noun[0] != word[0]:
         return False
     if noun in synonyms() or noun in hyponyms():

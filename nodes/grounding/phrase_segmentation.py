@@ -10,51 +10,28 @@ from dataclasses import dataclass, field
 
 from placegraph.nodes.grounding.attributes import COLORS
 from placegraph.nodes.grounding.relations import trigger_phrases
-from placegraph.runtime.language.word_forms import is_plural, normal_form, singular, tokens, word_list
+from placegraph.nodes.grounding.word_lists import word_list, word_table
+from placegraph.runtime.language.word_forms import is_plural, normal_form, singular, tokens
 
-FILLER = word_list("filler.txt")
-ANYTHING = frozenset(
-    (
-        "thing",
-        "things",
-        "something",
-        "anything",
-        "object",
-        "objects",
-        "item",
-        "items",
-        "furniture",
-        "stuff",
-        "everything",
-    )
-)
-WHOLE_MAP = frozenset(
-    ("house", "home", "building", "apartment", "flat", "map", "scene", "place", "room", "world", "environment")
-)
-ORDINALS = {
-    "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5, "sixth": 6, "seventh": 7, "eighth": 8, "ninth": 9,
-    "1st": 1, "2nd": 2, "3rd": 3, "4th": 4, "5th": 5, "6th": 6, "7th": 7, "8th": 8, "9th": 9,
-}  # fmt: skip
-FLOOR_WORDS = frozenset(("floor", "level", "storey", "story"))
+FILLER = frozenset(word_list("filler"))
+ANYTHING = frozenset(word_list("any_thing"))
+WHOLE_MAP = frozenset(word_list("whole_map"))
+ORDINALS: dict[str, int] = word_table("ordinals")
+FLOOR_WORDS = frozenset(word_list("floor"))
 FLOOR_KINDS = frozenset(("ground", "top", "upper", "lower", "lowest", "highest", "bottom", "main", "last")) | frozenset(
     ORDINALS
 )
 BREAKS = frozenset(",.;:?!")
-CAN_KINDS = frozenset(("trash", "garbage", "waste", "recycling", "recycle", "rubbish", "watering"))  # what is a can
+CAN_KINDS = frozenset(word_list("kinds_of_can"))
 VIEWS = {
     tuple(phrase.split()): "from"
     for phrase in ("seen from", "as seen from", "when seen from", "viewed from", "when viewed from", "looking from")
 }
 SIDES = {"left": "leftmost", "right": "rightmost", "middle": "middle"}
-IDIOMS = (
-    "i left", "we left", "you left", "left my", "have left", "on it", "at home",
-    "over there", "in here", "turn on", "turned on", "which room", "what room", "which floor",
-    "what floor", "take a look at", "look at", "what color", "next time", "is left", "in order",
-    "so that", "by the way", "go to", "from where i stand", "from where i am", "from here",
-)  # fmt: skip
+IDIOMS = word_list("idioms")
 
 # Only these sizes are separated from a noun: "low table" and "high chair" are kinds of things.
-SIZES = {"big": "large", "large": "large", "huge": "large", "small": "small", "little": "small", "tiny": "small"}
+SIZES: dict[str, str] = word_table("sizes_before_nouns")
 
 OWNS = r"\b(?:that |which )?(?:has|have|with|holds|holding|carries|carrying) (.{1,60}?) "
 INVERSE_PHRASES = (

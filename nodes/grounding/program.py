@@ -17,8 +17,8 @@ from placegraph.runtime.language.word_forms import normal_form
 
 ANYTHING = "thing"  # the noun of what has no name of its own: "something under the bed"
 SAME_KIND = "one"  # the noun of an anchor of the target's own kind: "next to the big one", "far from the others"
-MAX_DEPTH = 4  # departs: things within things; people go three deep
-MAX_CONDITIONS = 8  # departs: of one thing; the longest request of people read so far has five
+MAX_DEPTH = 4  # things within things; people go three deep
+MAX_CONDITIONS = 8  # of one thing; the longest of 400 human requests has five
 
 Kind = Literal["look", "group", "relation", "rank", "view", "place", "purpose"]
 

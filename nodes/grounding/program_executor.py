@@ -15,30 +15,27 @@ from placegraph.nodes.grounding.box_arrays import Boxes, Layout, layout_of
 from placegraph.nodes.grounding.conditions import SURFACE_NAMES, ConditionScorer, names_a_kind
 from placegraph.nodes.grounding.name_matching import NameMatch, NameMatcher
 from placegraph.nodes.grounding.program import SAME_KIND, Program, Thing
-from placegraph.nodes.grounding.ranking import TIE, Candidate, Ranking
+from placegraph.nodes.grounding.ranking import Candidate, Ranking
 from placegraph.nodes.grounding.scoring import ScoredCandidates
 from placegraph.nodes.grounding.search_scope import SearchScope, match_places, narrow_scope
-from placegraph.nodes.grounding.viewpoint import ViewpointSelector
+from placegraph.nodes.grounding.settings import DEFAULTS, GroundingSettings
+from placegraph.nodes.grounding.viewpoint import ASKER, ROOM_CENTER, ViewpointSelector, ViewpointSource
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
 
-MAX_LISTED = 50  # departs: candidates told with evidence; no request may ask for more (question.MAX_CANDIDATES)
-FAR_BETTER = 2.0  # departs: what holds by a hair does not go before what is so much better but for one condition
-FACED = 0.9  # departs: anchors of a view that fit nearly as well as the best vote on where it looks
-BESIDE_M, STOREY_M = 1.5, 2.0  # departs: who stands so near to one of several doors means that one
-ENTRANCE_WORDS = frozenset(
-    ("enter", "entering", "entered", "the", "room", "into", "through", "stepping", "walks", "inside",
-     "entrance", "enters", "entry", "exit", "walk", "walking", "come", "coming", "in", "doorway",
-     "walked", "entered", "step", "outside", "entryway")
-)  # fmt: skip
+MAX_LISTED = (
+    50  # candidates with evidence; as many as a request may ask for (MAX_CANDIDATES of runtime/query/request.py)
+)
+ENTRANCE_WORDS = frozenset(word_list("entrance"))
 
 
 @dataclass(frozen=True)
 class ReportedViewpoint:
     """The point (3,) in metres, world frame, from which left, right, front and behind were judged, and what it is."""
 
-    source: str  # "asker", "room centre", "place before window O4", "door O2"
+    source: ViewpointSource
     xyz_world: F64
 
 
@@ -52,16 +49,17 @@ class ProgramExecutor:
         asker_world: F64,
         heading_rad: float = np.nan,
         layout: Layout | None = None,
+        settings: GroundingSettings = DEFAULTS,
     ) -> None:
         """asker_world: (3,) metres, world frame; heading_rad: about z from +x; NaN when not given.
 
         layout: the graph's, when it is already computed.
         """
-        self.graph, self.names = graph, names
+        self.graph, self.names, self.settings = graph, names, settings
         self.asker_world = asker_world
         self.layout = layout or layout_of(graph)
         self.viewpoints = ViewpointSelector(
-            self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw
+            self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw, settings
         )
 
     def viewpoint(self, node: Node) -> ReportedViewpoint:
@@ -69,12 +67,12 @@ class ProgramExecutor:
         viewpoint = self.viewpoints.explicit
         height = float(node.center[2])
         if viewpoint is self.viewpoints.asker and viewpoint is not None:
-            return ReportedViewpoint("asker", self.asker_world)
+            return ReportedViewpoint(ASKER, self.asker_world)
         if viewpoint is not None:
             return ReportedViewpoint(viewpoint.source, self.layout.to_world(np.array([*viewpoint.eye, height])))
         room = self.graph.room_of(node.id)
         center = (self.graph.nodes[room] if room else self.graph.building).center
-        return ReportedViewpoint("room centre", center)
+        return ReportedViewpoint(ROOM_CENTER, center)
 
     def scope(self, target: Thing) -> SearchScope:
         """The part of the graph that the target's place words restrict the search to."""
@@ -96,20 +94,21 @@ class ProgramExecutor:
     def _nearest_to_asker(self, things: Boxes) -> Boxes:
         """Of several things to stand at, those that the asker stands at; all of them when there is none such."""
         distances_m = np.linalg.norm(things.center[:, :2] - self.asker_world[:2], axis=1)
-        same_storey = np.abs(things.low[:, 2] - self.asker_world[2]) <= STOREY_M
-        rows = np.flatnonzero((distances_m <= BESIDE_M) & same_storey)
+        same_storey = np.abs(things.low[:, 2] - self.asker_world[2]) <= self.settings.viewpoint.storey_m
+        rows = np.flatnonzero((distances_m <= self.settings.viewpoint.at_door_m) & same_storey)
         return things.take(rows) if len(rows) else things
 
     def _conditions(self, scope: SearchScope, ranking: Ranking) -> ConditionScorer:
         return ConditionScorer(self.graph, self.names, self.layout, self.viewpoints, scope, ranking)
 
-    @staticmethod
-    def _fill_ranking(ranking: Ranking, target: Thing, scored: ScoredCandidates, matches: Sequence[NameMatch]) -> None:
+    def _fill_ranking(
+        self, ranking: Ranking, target: Thing, scored: ScoredCandidates, matches: Sequence[NameMatch]
+    ) -> None:
         """Put the best candidates into the ranking, those that hold before the others."""
         scores = scored.scores
         keys = [(not scored.holds[i], -scores[i], id_key(matches[i].node.id)) for i in range(len(matches))]
         listed = sorted(range(len(matches)), key=keys.__getitem__)
-        if scores.max() > FAR_BETTER * scores[listed[0]]:
+        if scores.max() > self.settings.scores.much_better * scores[listed[0]]:
             listed = sorted(listed, key=lambda i: (-scores[i], keys[i]))
         for i in listed[:MAX_LISTED]:
             naming = [f"{scored.boxes.labels[i]} is called {matches[i].tag}"] if names_a_kind(target.noun) else []
@@ -124,7 +123,7 @@ class ProgramExecutor:
             # "what is under the bed?": without a name, only what really is there is an answer
             ranking.notes += best.evidence
             ranking.candidates.clear()
-        elif len(matches) > 1 and scores.max() - scores.min() < TIE:
+        elif len(matches) > 1 and scores.max() - scores.min() < self.settings.scores.tie:
             ranking.note("nothing that is said tells one thing from another")
             ranking.candidates.clear()
 
@@ -162,5 +161,7 @@ class ProgramExecutor:
             if anchors is None:
                 conditions.ranking.note(f"nothing in the map is called {thing.noun}, so nobody looks from there")
                 continue
-            self.viewpoints.requested = choices[condition.name](self._nearest_to_asker(anchors.best(min_weight=FACED)))
+            self.viewpoints.requested = choices[condition.name](
+                self._nearest_to_asker(anchors.best(min_weight=self.settings.viewpoint.min_faced))
+            )
             conditions.clear_anchors()  # they were scored from another viewpoint

@@ -24,16 +24,13 @@ from placegraph.nodes.grounding.program import (
     ConditionForm,
     Thing,
 )
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.word_forms import tokens
 
 LEXEME = re.compile(r"\s*([;,()]|[a-z0-9'-]+)")
 # No noun starts with one of these words; leaving them out halves the grammar's choices.
-NEVER_FIRST = frozenset(
-    ("the", "a", "an", "is", "are", "was", "be", "of", "to", "and", "or", "in", "on", "at", "it", "its", "this", "that",
-     "these", "those", "which", "who", "with", "by", "for", "from", "as", "your", "you", "i", "my", "me", "we", "our",
-     "they", "their", "them", "than", "then", "so", "if", "when", "there")
-)  # fmt: skip
+NEVER_FIRST = frozenset(word_list("never_first_in_a_noun"))
 
 
 def parse_program(text: str) -> Thing:

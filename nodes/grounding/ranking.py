@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 
 from placegraph.runtime.scene_graph import Node
 
-TIE = 0.03  # departs: scores that differ by less do not tell two objects apart
-
 
 @dataclass
 class Candidate:
@@ -27,12 +25,13 @@ class Ranking:
     notes: list[str] = field(default_factory=list)
     sure: bool = True
 
-    def tied(self) -> list[Candidate]:
-        """The best candidate and those that the evidence cannot tell from it."""
+    def tied(self, max_difference: float) -> list[Candidate]:
+        """The best candidate and those that the evidence cannot tell from it: with scores within max_difference."""
         return [
             candidate
             for candidate in self.candidates
-            if candidate.score >= self.candidates[0].score - TIE and candidate.holds == self.candidates[0].holds
+            if candidate.score >= self.candidates[0].score - max_difference
+            and candidate.holds == self.candidates[0].holds
         ]
 
     def note(self, text: str) -> None:

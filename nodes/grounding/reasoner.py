@@ -7,12 +7,10 @@ question; the paper's flow, a call per layer, is the mode "deductive".
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from placegraph.nodes.grounding.answer_fields import found, not_in_map
 from placegraph.nodes.grounding.box_arrays import Layout, layout_of
 from placegraph.nodes.grounding.deductive_reasoning import deduce
 from placegraph.nodes.grounding.llm_parser import parse_by_examples, parse_by_model
@@ -21,18 +19,21 @@ from placegraph.nodes.grounding.program import Program, Thing
 from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.nodes.grounding.program_syntax import format_program
 from placegraph.nodes.grounding.ranking import Ranking
+from placegraph.nodes.grounding.reply_builder import ReplyBuilder
 from placegraph.nodes.grounding.rule_parser import check_text, parse_by_rules
 from placegraph.nodes.grounding.search_scope import SearchScope, match_places
+from placegraph.nodes.grounding.settings import DEFAULTS, GroundingSettings
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.language.prompts import fill_prompt
 from placegraph.runtime.language.word_forms import normal_form, tokens
 from placegraph.runtime.messages import Question
+from placegraph.runtime.query.reply import LayerSelection, ProgramParse, Reply
 from placegraph.runtime.query.request import MODES
 from placegraph.runtime.scene_graph import ID_PATTERN, Node, SceneGraph
 
-MAX_OPTIONS = 24  # departs: names of things offered for a purpose; each costs the model 30 to 60 ms
-# Confidence below which a reading gives way to the deductive mode. Departs: of 300 requests of people and of phrasings
+MAX_OPTIONS = 24  # names offered for a purpose; each costs the model 30 to 60 ms
+# Confidence below which a reading gives way to the deductive mode. Measured: of 300 requests of people and of phrasings
 # that training never said 5 readings lay below 0.1, none of them right, and above it 82 % were.
 MIN_CONFIDENCE = 0.05
 
@@ -47,20 +48,26 @@ class ModeResult:
     sure: bool
     reader: str = ""  # "model" or "rules"
     confidence: float | None = None  # of the model's reading, 0..1
-    levels: dict[str, Any] | None = None  # mode "deductive": the ids kept of each level
+    selection: LayerSelection | None = None  # mode "deductive"
 
 
 class Reasoner:
     """Answers questions about one graph at a time."""
 
     def __init__(
-        self, names: NameMatcher, model: LanguageModel, place_types: Sequence[str], *, use_model: bool
+        self,
+        names: NameMatcher,
+        model: LanguageModel,
+        place_types: Sequence[str],
+        *,
+        use_model: bool,
+        settings: GroundingSettings = DEFAULTS,
     ) -> None:
         """place_types: names of kinds of places; they count as places even when the map has none of that kind."""
         self._names = names
         self._model = model
         self._place_types = frozenset(map(normal_form, place_types))
-        self._use_model = use_model
+        self._use_model, self._settings = use_model, settings
         self._layout: tuple[SceneGraph, Layout] | None = None
         self._modes: dict[str, Callable[[SceneGraph, Question], ModeResult]] = {
             "program": self._answer_by_model,
@@ -68,41 +75,32 @@ class Reasoner:
             "deductive": self._answer_deductive,
         }
 
-    def answer(self, graph: SceneGraph, revision: int, question: Question) -> dict[str, Any]:
-        """The answer's fields. Raises QueryError for a question that cannot be answered at all."""
+    def answer(self, graph: SceneGraph, revision: int, question: Question) -> Reply:
+        """Answer a question. Raises QueryError for a question that cannot be answered at all."""
         _check(question)
         calls_before = self._model.calls
         result = self._modes[question.mode](graph, question)
-        return self._build_fields(graph, revision, question, result, calls_before)
+        return self._reply(revision, question, result, calls_before)
 
-    def answer_program(self, graph: SceneGraph, revision: int, question: Question, program: Program) -> dict[str, Any]:
-        """The answer to a question whose program is given. Raises QueryError."""
+    def answer_program(self, graph: SceneGraph, revision: int, question: Question, program: Program) -> Reply:
+        """Answer a question whose program is given. Raises QueryError."""
         calls_before = self._model.calls
-        return self._build_fields(graph, revision, question, self._execute(graph, question, program, ""), calls_before)
+        return self._reply(revision, question, self._execute(graph, question, program, ""), calls_before)
 
-    def _build_fields(
-        self, graph: SceneGraph, revision: int, question: Question, result: ModeResult, calls_before: int
-    ) -> dict[str, Any]:
+    def _reply(self, revision: int, question: Question, result: ModeResult, calls_before: int) -> Reply:
         program, ranking = result.program, result.ranking
-        parse = result.levels
+        parse: ProgramParse | LayerSelection | None = result.selection
         if program:
-            parse = {
-                "text": format_program(program.target),
-                "program": program.model_dump(mode="json"),
-                "confidence": result.confidence,
-                "reader": result.reader,
-            }
-        common = {
-            "question": question.text,
-            "question_id": question.question_id,
-            "parse": parse,
-            "revision": revision,
-            "llm_calls": self._model.calls - calls_before,
-        }
+            parse = ProgramParse(
+                text=format_program(program.target),
+                program=program.model_dump(mode="json"),
+                confidence=result.confidence,
+                reader=result.reader,
+            )
+        builder = ReplyBuilder(question, revision, result.executor, parse, self._model.calls - calls_before)
         if not ranking.candidates:
-            target = program.target if program else Thing()
-            return common | not_in_map(graph, target, ranking, result.executor, self._names)
-        return common | found(graph, ranking, result.executor, question.k, result.sure)
+            return builder.not_in_map(ranking, program.target if program else Thing())
+        return builder.found(ranking, sure=result.sure)
 
     def _answer_by_model(self, graph: SceneGraph, question: Question) -> ModeResult:
         if not self._use_model:  # the reply's `parse` says that the rules read it
@@ -137,9 +135,11 @@ class Reasoner:
         if not self._use_model:
             raise QueryError("mode 'deductive' needs the language model, which use_model = false switches off")
         asker = np.asarray(question.viewpoint_world, float)
-        executor = ProgramExecutor(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
-        levels, ranking = deduce(self._model, executor, question.text)
-        return ModeResult(None, ranking, executor, ranking.sure, "levels", levels=asdict(levels))
+        executor = ProgramExecutor(
+            graph, self._names, asker, question.heading_rad, self._layout_of(graph), self._settings
+        )
+        selection, ranking = deduce(self._model, executor, question.text)
+        return ModeResult(None, ranking, executor, ranking.sure, "levels", selection=selection)
 
     def _answer_by_rules(self, graph: SceneGraph, question: Question) -> ModeResult:
         return self._execute(graph, question, self.parse(graph, question.text), "rules")
@@ -149,12 +149,14 @@ class Reasoner:
     ) -> ModeResult:
         """Execute a program on the graph; a purpose ("something to sit on") is first turned into a noun."""
         asker = np.asarray(question.viewpoint_world, float)
-        executor = ProgramExecutor(graph, self._names, asker, question.heading_rad, self._layout_of(graph))
+        executor = ProgramExecutor(
+            graph, self._names, asker, question.heading_rad, self._layout_of(graph), self._settings
+        )
         scope = executor.scope(program.target)
         if any(program.target.conditions_named("for")):
             program = self._by_purpose(program, scope)
         ranking = executor.rank(program, scope)
-        tied = ranking.tied()
+        tied = ranking.tied(self._settings.scores.tie)
         if len(tied) > 1:  # the lowest id stands first
             ranking.note(f"{len(tied)} candidates fit equally: {', '.join(candidate.node.id for candidate in tied)}")
         return ModeResult(program, ranking, executor, ranking.sure, reader, confidence)

@@ -11,18 +11,14 @@ from dataclasses import dataclass, field
 
 from placegraph.nodes.grounding.phrase_segmentation import WHOLE_MAP, Phrase, segment
 from placegraph.nodes.grounding.program import ANYTHING, CONDITIONS, MAX_DEPTH, Condition, Program, Thing
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.word_forms import normal_form, tokens
 
-MAX_CHARS = 500  # departs: a spoken request is far shorter; longer text is no question and would not fit the model
-MAX_CLAUSES = 4  # departs: relations of one request; people say no more in one breath
+MAX_CHARS = 500  # a spoken request is far shorter, and more would not fit the model's context
+MAX_CLAUSES = 4  # relations of one request; people say no more
 ON_SPOT = ("corner", "center")  # said of the room, or "of" a thing
-PURPOSE_STARTS = (
-    "where can i", "where could i", "where do i", "where should i", "where may i", "where can we", "where do you",
-    "something to", "somewhere to", "something for", "place to", "something i can", "anything to", "i want to",
-    "i need to", "i would like to", "i'd like to", "i am", "i'm", "something that", "help me", "used to", "used for",
-    "what can i use", "object to", "thing to", "furniture to", "want to",
-)  # fmt: skip
+PURPOSE_STARTS = word_list("purpose_starts")
 
 
 @dataclass(frozen=True)

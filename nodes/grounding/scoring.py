@@ -12,17 +12,9 @@ import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import HOLDS, rank_positions
+from placegraph.nodes.grounding.settings import ScoreSettings
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.scene_graph import Node
-
-MIN = 0.03  # departs: what fails a condition stays listed, far below those for which it holds
-# departs: names that fit within the first step are the same word for the things; when one thing alone bears it, within
-# the next steps others may be meant: an office chair by "chair", a couch by "sofa"; a chair by "seat"; by likeness
-NAME_STEPS = (0.04, 0.12, 0.2)
-OFF_NAME = 0.4  # departs: what bears a less fitting name than others that are there is meant when little else fits
-RUNNER_UP, LEVEL = 0.45, 0.97  # departs: of a rank: what comes next to it, and what cannot be told from it
-OUTRANKED = 0.1  # departs: of a rank: what is not among those that it is said of
-MEASURED = 0.6  # departs: how much of a runner-up's score its distance in the measure takes
 
 Sentence = Callable[[int], str]
 
@@ -34,18 +26,21 @@ class ScoredCandidates:
     is_unique: exactly one candidate has the best name. nodes: None for parts of rooms.
     """
 
-    def __init__(self, boxes: Boxes, nodes: Sequence[Node | None], names: F64, *, narrowed: bool) -> None:
+    def __init__(
+        self, boxes: Boxes, nodes: Sequence[Node | None], names: F64, settings: ScoreSettings, *, narrowed: bool
+    ) -> None:
         """`names` (n,) is how well each is named, 0..1; narrowed: the request says more than the noun."""
-        self.boxes, self.nodes = boxes, nodes
+        self.boxes, self.nodes, self.settings = boxes, nodes, settings
+        steps = (settings.same_name, settings.similar_name, settings.related_name)
         self.scores = names.astype(float)
         self.sentences: list[Sentence] = []
         best = float(names.max()) if len(names) else 0.0
-        groups = [names >= best - step for step in NAME_STEPS]
+        groups = [names >= best - step for step in steps]
         # who says more than the noun needs to: several things must have that name, if need be a less fitting one
         peers = next((group for group in groups if group.sum() > 1), groups[0]) if narrowed else groups[0]
         self.is_unique = bool(groups[0].sum() == 1)  # one thing alone bears the name
         self.peers: Bool = peers
-        self.scores = np.where(peers, self.scores, OFF_NAME * self.scores)
+        self.scores = np.where(peers, self.scores, settings.off_name * self.scores)
         self.holds: Bool = groups[-1]
         self._rankable: Bool | None = None  # fixed by the first rank
 
@@ -56,13 +51,13 @@ class ScoredCandidates:
         """Apply a condition's fits (n,) 0..1; negated: the request denies the condition."""
         fits = 1.0 - values if negated else values
         holds = fits >= HOLDS - 1e-9
-        self.scores = self.scores * np.power(np.clip(fits, MIN, 1.0), trust)
+        self.scores = self.scores * np.power(np.clip(fits, self.settings.min_fit, 1.0), trust)
         self.holds = self.holds & holds
         self.sentences.append(lambda i: sentence(i) if holds[i] else f"not as said: {sentence(i)}")
 
     def apply_hint(self, values: F64, sentence: Sentence, trust: float) -> None:
         """Raise the scores of those that something fits, without demanding that it holds."""
-        self.scores = self.scores * np.power(np.clip(values, MIN, 1.0), trust)
+        self.scores = self.scores * np.power(np.clip(values, self.settings.min_fit, 1.0), trust)
         self.sentences.append(sentence)
 
     def rankable(self) -> Bool:
@@ -78,24 +73,23 @@ class ScoredCandidates:
         self, measure: F64, number: int, margin: float, sentence: Sentence, *, trust: float, negated: bool
     ) -> None:
         """Apply a rank: the number-th greatest measure (n,) among the rankable candidates is meant."""
-        self._rankable = self.rankable()
+        settings, self._rankable = self.settings, self.rankable()
         rows = np.flatnonzero(self._rankable & np.isfinite(measure))
         if len(rows) < number and int(self.peers.sum()) >= number:
             # "the second" where only one holds: another condition was misread
             rows = np.flatnonzero(self.peers & np.isfinite(measure))
-        values = np.full(len(self), OUTRANKED)
+        values = np.full(len(self), settings.outranked)
         places = rank_positions(measure[rows])
         count = len(rows)
         reached = min(number, count)  # "the fifth" of three: a misread number, the last comes nearest
         if count:
             reached_value = float(measure[rows][places == reached][0])
-            span = max(float(np.ptp(measure[rows])), 1e-6)
             off = np.abs(measure[rows] - reached_value)
-            runners = RUNNER_UP * (1 - MEASURED * off / span) / np.maximum(np.abs(places - reached), 1) ** 0.5
-            values[rows] = np.where(places == reached, 1.0, np.where(off <= margin, LEVEL, runners))
-            values[rows] *= 1.0 if count >= number else RUNNER_UP
+            runners = settings.runner_up / np.maximum(np.abs(places - reached), 1) ** 0.5
+            values[rows] = np.where(places == reached, 1.0, np.where(off <= margin, settings.level, runners))
+            values[rows] *= 1.0 if count >= number else settings.runner_up
         if negated:  # candidates outside the comparison must not gain by the negation
-            values[np.setdiff1d(np.arange(len(self)), rows)] = 1 - OUTRANKED
+            values[np.setdiff1d(np.arange(len(self)), rows)] = 1 - settings.outranked
         position_of_row = {int(row): int(k) for row, k in zip(rows, places, strict=True)}
         short = f"; there are only {count}, not {number}" if count < number else ""
 

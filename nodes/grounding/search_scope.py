@@ -8,29 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from placegraph.nodes.grounding.name_matching import HEAD, NameMatch, NameMatcher
+from placegraph.nodes.grounding.name_matching import NameMatch, NameMatcher
 from placegraph.nodes.grounding.phrase_segmentation import ORDINALS, WHOLE_MAP
 from placegraph.nodes.grounding.program import Condition, Thing
 from placegraph.nodes.grounding.program_syntax import format_program
+from placegraph.nodes.grounding.word_lists import word_table
 from placegraph.runtime.language.word_forms import normal_form
 from placegraph.runtime.scene_graph import Node, SceneGraph
 
-PLACE_LIKENESS = 0.7  # departs: the embeddings put bedroom and living room at 0.5, which are not the same place
 # What rooms of a kind typically hold, the most typical first; used when the map has no room of that name.
-TYPICAL_OBJECTS: dict[str, tuple[str, ...]] = {
-    "bathroom": ("toilet", "bathtub", "shower", "urinal", "bathroom vanity"),
-    "kitchen": ("stove", "refrigerator", "kitchen counter", "kitchen cabinet", "dishwasher"),
-    "bedroom": ("bed", "nightstand"),
-    "living room": ("sofa", "coffee table", "tv"),
-    "office": ("desk", "office chair"),
-    "work area": ("desk", "office chair"),
-    "dining room": ("dining table", "table"),
-    "dining area": ("dining table", "table"),
-    "laundry room": ("washing machine", "clothes dryer"),
-    "sitting area": ("sofa", "armchair"),
-    "cooking area": ("stove",),
-    "sleeping area": ("bed",),
-}
+TYPICAL_OBJECTS: dict[str, list[str]] = word_table("typical_objects")
 
 RankPlaces = Callable[[Thing, Sequence[NameMatch]], list[Node]]
 
@@ -115,12 +102,17 @@ def _by_room(
 
 def _is_thing(noun: str, graph: SceneGraph, names: NameMatcher) -> bool:
     """Whether an object has this name by its words; by embedding similarity alone a bathroom would be a toilet."""
-    return any(match.score >= HEAD for match in names.best_matches(noun, graph.layer("object")))
+    return any(match.score >= names.settings.head for match in names.best_matches(noun, graph.layer("object")))
 
 
-def _typical_objects(noun: str, names: NameMatcher) -> tuple[str, ...]:
+def _typical_objects(noun: str, names: NameMatcher) -> Sequence[str]:
     return next(
-        (things for kind, things in TYPICAL_OBJECTS.items() if names.similarity(noun, kind) >= PLACE_LIKENESS), ()
+        (
+            things
+            for kind, things in TYPICAL_OBJECTS.items()
+            if names.similarity(noun, kind) >= names.settings.min_place_similarity
+        ),
+        (),
     )
 
 
@@ -144,7 +136,11 @@ def _keep_below(graph: SceneGraph, scope: SearchScope, tops: Sequence[Node], *, 
 
 def match_places(name: str, places: Sequence[Node], names: NameMatcher) -> list[NameMatch]:
     """Rooms and locations with that name: those whose strongest tag it is, else those that have it among their tags."""
-    matches = [m for m in names.best_matches(name, places) if names.similarity(name, m.tag) >= PLACE_LIKENESS]
+    matches = [
+        m
+        for m in names.best_matches(name, places)
+        if names.similarity(name, m.tag) >= names.settings.min_place_similarity
+    ]
     strongest = [match for match in matches if match.node.tags and match.tag == match.node.tags[0].name]
     return strongest or matches
 

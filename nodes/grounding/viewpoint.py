@@ -8,24 +8,43 @@ z x f. Not as in the paper: who faces a thing stands squarely before it, so f is
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import Boxes, Layout
+from placegraph.nodes.grounding.box_arrays import Boxes, Label, Layout
+from placegraph.nodes.grounding.settings import DEFAULTS, GroundingSettings
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 
-WALL_M = 0.5  # departs: what stands so close to a wall has its back to it
-ELONGATED = 1.4  # departs: from this ratio of its sides on, a thing has a broad side that people face
-LONG_ENOUGH = 1.1  # departs: the same for beds, which have a foot however wide they are
-LONG_FACED = ("bed", "couch bed", "bunk bed", "bathtub", "crib")  # faced along their long side, from the foot
-AT_ROOM_M = 1.5  # departs: what one may stand at belongs to a room within this, through its wall
-MIDDLE_TRUST = 0.5  # departs: nobody said where the viewer is; the room's centre is right more often than not
-SAME_WAY = 0.9  # departs: cosine of lines of sight that look at the same wall
-MAX_FACED = 50  # departs: more things than this nobody looks at; the best named are asked
-ROW_RATIO = 3.0  # departs: as long to wide as things must lie to be a row that people stand before
-ROW_ALONG = 0.95  # departs: cosine; rows stand along walls, what lies aslant is no row
-ROW_ASIDE_M = 0.3  # departs: a row through the room's middle has no side on which one stands
-HINT_TRUST = 0.7  # departs: who says "the left pillow on the bed" stands before the bed
+LONG_FACED = word_list("faced_from_their_end")
+MAX_FACED = 50  # things whose lines of sight are compared; bounds the time of "facing the chairs"
+
+
+class ViewpointKind(Enum):
+    """Where a viewer stands; the value is its wording, with the things it refers to."""
+
+    ASKER = "asker"
+    ROOM_CENTER = "room centre"
+    AT = "{}"
+    BEFORE = "place before {}"  # facing it
+    FRONT = "front of {}"  # facing the front that the map knows
+    BACK_TO = "{} in the back"
+
+
+@dataclass(frozen=True)
+class ViewpointSource:
+    """What a viewpoint was taken from: its kind, and the things that it refers to."""
+
+    kind: ViewpointKind
+    things: tuple[Label, ...] = ()
+
+    def __str__(self) -> str:
+        """The wording in replies: `asker`, `place before window O4`."""
+        return self.kind.value.format(", ".join(map(str, self.things)))
+
+
+ASKER, ROOM_CENTER = ViewpointSource(ViewpointKind.ASKER), ViewpointSource(ViewpointKind.ROOM_CENTER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +54,7 @@ class Viewpoint:
     forward: None when the viewer turns to whatever is judged. trust: 0..1, lower when nobody named a viewpoint.
     """
 
-    source: str  # "asker", "room centre", "one who faces window O4"
+    source: ViewpointSource
     eye: F64
     forward: F64 | None = None
     trust: float = 1.0
@@ -45,11 +64,11 @@ class Viewpoint:
 
 @dataclass(frozen=True, eq=False)
 class LinesOfSight:
-    """Lines of sight to m things: forward (m, 2) unit vectors, eye (m, 2) m, sources in words, trust (m,) 0..1."""
+    """Lines of sight to m things: forward (m, 2) unit vectors, eye (m, 2) m, sources, trust (m,) 0..1."""
 
     forward: F64
     eye: F64
-    sources: tuple[str, ...]
+    sources: tuple[ViewpointSource, ...]
     trust: F64
 
     @property
@@ -61,14 +80,16 @@ class LinesOfSight:
 class ViewpointSelector:
     """Chooses the viewpoints of one request on one map."""
 
-    def __init__(self, layout: Layout, asker_world: F64, heading_rad: float = np.nan) -> None:
+    def __init__(
+        self, layout: Layout, asker_world: F64, heading_rad: float = np.nan, settings: GroundingSettings = DEFAULTS
+    ) -> None:
         """asker_world: (3,) metres, building frame, NaN when not given; heading_rad: about z from +x, NaN likewise."""
-        self.layout = layout
+        self.layout, self.settings = layout, settings
         self.requested: Viewpoint | None = None  # set by the program executor
         self.asker: Viewpoint | None = None
         if np.isfinite(asker_world).all():
             heading = np.array([np.cos(heading_rad), np.sin(heading_rad)]) if np.isfinite(heading_rad) else None
-            self.asker = Viewpoint("asker", asker_world[:2], heading)
+            self.asker = Viewpoint(ASKER, asker_world[:2], heading)
 
     @property
     def explicit(self) -> Viewpoint | None:
@@ -79,7 +100,7 @@ class ViewpointSelector:
         """The line of sight to each anchor."""
         middle = self.layout.room_center(anchors.room)
         forward, eye = anchors.center[:, :2] - middle, middle
-        sources, trust = ["room centre"] * len(anchors), np.full(len(anchors), MIDDLE_TRUST)
+        sources, trust = [ROOM_CENTER] * len(anchors), np.full(len(anchors), self.settings.viewpoint.unstated_trust)
         viewpoint = self.explicit
         if viewpoint is not None:
             viewpoints = [self._nearest_to_room(viewpoint, int(room)) for room in anchors.room]
@@ -93,7 +114,7 @@ class ViewpointSelector:
                 if np.isfinite(anchors.front[j]).all():
                     forward[j], trust[j] = -anchors.front[j], 1.0
                     eye[j] = anchors.center[j, :2] + 2.0 * anchors.front[j]
-                    sources[j] = f"front of {anchors.labels[j]}"
+                    sources[j] = ViewpointSource(ViewpointKind.FRONT, (anchors.labels[j],))
                 else:
                     forward[j] = self.facing_direction(anchors, j)
         return LinesOfSight(_unit(forward), eye, tuple(sources), trust)
@@ -116,18 +137,21 @@ class ViewpointSelector:
             )
         if reference is not None and len(reference) and reference.ids[0]:
             faced = self.in_front_of(reference.take([0]))
-            return Viewpoint(faced.source, faced.eye, faced.forward, HINT_TRUST)
+            return Viewpoint(faced.source, faced.eye, faced.forward, self.settings.viewpoint.unstated_trust)
         eye = self.layout.room_center(np.array([room]))[0]
         whole = Boxes(
-            ("them",), ("",), targets.low.min(axis=0, keepdims=True), targets.high.max(axis=0, keepdims=True),
+            (Label("the targets"),), targets.low.min(axis=0, keepdims=True), targets.high.max(axis=0, keepdims=True),
             np.zeros(1), np.full((1, 2), np.nan), np.array([room]),
         ) if len(targets) else None  # fmt: skip
         forward = self.facing_direction(whole, 0) if whole is not None else np.array([0.0, 1.0])
         # in the middle of them: look along +y, so that left is -x as on a map
-        return Viewpoint("room centre", eye, forward if forward.any() else np.array([0.0, 1.0]), MIDDLE_TRUST)
+        return Viewpoint(
+            ROOM_CENTER, eye, forward if forward.any() else np.array([0.0, 1.0]), self.settings.viewpoint.unstated_trust
+        )
 
     def facing_direction(self, things: Boxes, j: int) -> F64:
         """(2,) forward direction of one who stands in the room squarely before thing j; 0 at the room's very centre."""
+        numbers = self.settings.viewpoint
         center, room = things.center[j, :2], things.room[j]
         from_room = center - self.layout.room_center(np.array([room]))[0]
         length = float(np.linalg.norm(from_room))
@@ -141,12 +165,12 @@ class ViewpointSelector:
         edge = np.where(directions > 0, high - center, low - center)
         steps = np.where(np.abs(directions) > 0.3, edge / np.where(np.abs(directions) > 0.3, directions, 1), np.inf)
         free = steps.min(axis=1) - half
-        is_long_faced = things.labels[j].rsplit(" ", 1)[0] in LONG_FACED
-        broad = (long if is_long_faced else ~long) * (ratio >= (LONG_ENOUGH if is_long_faced else ELONGATED))
-        if not broad.any() and (free > WALL_M).all():
+        is_long_faced = things.labels[j].name in LONG_FACED
+        broad = (long if is_long_faced else ~long) * (is_long_faced or ratio >= numbers.elongated)
+        if not broad.any() and (free > numbers.wall_m).all():
             return from_room / length if length > 0.05 else np.zeros(2)
         score = directions @ (from_room / length) if length > 0.05 else np.zeros(4)
-        score = score + 1.0 * (free <= WALL_M) + 1.0 * broad
+        score = score + 1.0 * (free <= numbers.wall_m) + 1.0 * broad
         return np.asarray(directions[int(np.argmax(score))])
 
     def in_front_of(self, things: Boxes) -> Viewpoint:
@@ -156,44 +180,28 @@ class ViewpointSelector:
         center = things.center[0, :2]
         room = self.layout.room_center(things.room[:1])[0]
         away = max(float((center - room) @ forward), float(np.abs(forward) @ things.size[0, :2]) / 2 + 1.0)
-        return Viewpoint(
-            f"place before {things.labels[0]}", center - forward * away, forward if forward.any() else None
-        )
+        source = ViewpointSource(ViewpointKind.BEFORE, things.labels[:1])
+        return Viewpoint(source, center - forward * away, forward if forward.any() else None)
 
     def in_front_of_most(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who faces several things ("the windows"): towards the wall that most of them are on."""
-        row = self._in_front_of_row(things)
-        if row is not None:
-            return row
         viewpoints = [self.in_front_of(things.take([j])) for j in range(min(len(things), MAX_FACED))]
         directions = np.array([np.zeros(2) if v.forward is None else v.forward for v in viewpoints])
-        return viewpoints[int(np.argmax((directions @ directions.T > SAME_WAY).sum(axis=1)))]
-
-    def _in_front_of_row(self, things: Boxes) -> Viewpoint | None:
-        """The viewpoint before a row of things in one room, looking across the row; None when they form no row."""
-        if len(things) < 2 or len(set(things.room.tolist())) > 1:
-            return None
-        centers = things.center[:, :2]
-        spread, axes = np.linalg.eigh(np.cov(centers.T))
-        if np.sqrt(spread[1]) < ROW_RATIO * np.sqrt(max(spread[0], 0.0)) or spread[1] < 1e-6:
-            return None
-        middle, room = centers.mean(axis=0), self.layout.room_center(things.room[:1])[0]
-        across = float((middle - room) @ axes[:, 0])
-        if abs(across) < ROW_ASIDE_M or np.abs(axes[:, 0]).max() < ROW_ALONG:
-            return None
-        forward = np.round(axes[:, 0]) * np.sign(across)
-        across = float((middle - room) @ forward)
-        return Viewpoint(f"place before {', '.join(things.labels)}", middle - forward * max(abs(across), 1.0), forward)
+        return viewpoints[
+            int(np.argmax((directions @ directions.T > self.settings.viewpoint.same_direction).sum(axis=1)))
+        ]
 
     def with_back_to(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who turns the back to the first of some things."""
         forward = -self.facing_direction(things, 0)
-        return Viewpoint(f"{things.labels[0]} in the back", things.center[0, :2], forward if forward.any() else None)
+        source = ViewpointSource(ViewpointKind.BACK_TO, things.labels[:1])
+        return Viewpoint(source, things.center[0, :2], forward if forward.any() else None)
 
     def at(self, things: Boxes) -> Viewpoint:
         """The viewpoint of one who stands at a thing and turns to what is judged; of several, at the room's own."""
         viewpoints = [
-            Viewpoint(things.labels[j], things.center[j, :2], z_m=float(things.low[j, 2])) for j in range(len(things))
+            Viewpoint(ViewpointSource(ViewpointKind.AT, (label,)), things.center[j, :2], z_m=float(things.low[j, 2]))
+            for j, label in enumerate(things.labels)
         ]
         return Viewpoint(viewpoints[0].source, viewpoints[0].eye, others=tuple(viewpoints))
 
@@ -208,9 +216,9 @@ class ViewpointSelector:
         places = np.array([[*other.eye, other.z_m] for other in viewpoint.others])
         away = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0), axis=1)
         nearest = viewpoint.others[int(np.argmin(away))]
-        if away.min() <= AT_ROOM_M:
+        if away.min() <= self.settings.viewpoint.at_door_m:
             return nearest
-        return self.asker or replace(nearest, trust=MIDDLE_TRUST)
+        return self.asker or replace(nearest, trust=self.settings.viewpoint.unstated_trust)
 
 
 def _unit(vectors: F64) -> F64:

@@ -60,11 +60,6 @@ def is_plural(phrase: str) -> bool:
     return singular(last) != last
 
 
-def word_list(file: str) -> frozenset[str]:
-    """The words of a text file of this package; lines that start with # are comments."""
-    return frozenset(word for line in _lines(file) for word in line.split())
-
-
 @cache
 def synonyms() -> dict[str, frozenset[str]]:
     """Names of the same kind of thing, by normal form, with and without the spaces of compounds (synonyms.txt)."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from placegraph.runtime.bus.session import IncomingQuery
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Question
-from placegraph.runtime.query.reply import answered, encode_reply, error_reply
+from placegraph.runtime.query.reply import error_reply, reply_json
 from placegraph.runtime.query.request import parse_request, request_id
 
 MAX_WAITING = 16  # chosen by hand: at a second an answer, the last one waits less than the time limit
@@ -25,17 +23,12 @@ class _PendingQuestion:
     arrived_s: float  # monotonic
     timer: threading.Timer
 
-    def answer(self, answer: dict[str, Any]) -> None:
+    def answer(self, answer_json: str) -> None:
         self.timer.cancel()
-        self.query.reply(encode_reply(answered(answer, self._waited_ms())))
+        self.query.reply(_reply_bytes(answer_json, self.arrived_s))
 
     def refuse(self, reason: str) -> None:
-        self.timer.cancel()
-        reply = error_reply(reason, self.question.question_id, self.question.text, self._waited_ms())
-        self.query.reply(encode_reply(reply))
-
-    def _waited_ms(self) -> float:
-        return (time.monotonic() - self.arrived_s) * 1e3
+        self.answer(error_reply(reason, self.question.question_id, self.question.text).to_answer_json())
 
 
 class QueryServer:
@@ -58,8 +51,8 @@ class QueryServer:
         try:
             question = parse_request(query.payload, f"Q{number}")
         except QueryError as error:
-            ms = (time.monotonic() - arrived_s) * 1e3
-            query.reply(encode_reply(error_reply(str(error), request_id(query.payload), ms=ms)))
+            reply = error_reply(str(error), request_id(query.payload))
+            query.reply(_reply_bytes(reply.to_answer_json(), arrived_s))
             return
         timer = threading.Timer(self._timeout_s, self._refuse, (number, f"no answer within {self._timeout_s:g} s"))
         timer.daemon = True
@@ -79,7 +72,7 @@ class QueryServer:
     def answer(self, number: int, answer_json: str) -> None:
         """Reply to a question with the node's answer; does nothing when its time limit was reached before."""
         if (pending := self._pop(number)) is not None:
-            pending.answer(json.loads(answer_json))
+            pending.answer(answer_json)
 
     def _refuse(self, number: int, reason: str) -> None:
         if (pending := self._pop(number)) is not None:
@@ -101,3 +94,8 @@ class QueryServer:
             numbers = list(self._waiting)
         for number in numbers:
             self._refuse(number, reason)
+
+
+def _reply_bytes(answer_json: str, arrived_s: float) -> bytes:
+    """The reply to a query that arrived at a monotonic time."""
+    return reply_json(answer_json, (time.monotonic() - arrived_s) * 1e3).encode()

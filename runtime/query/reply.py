@@ -44,32 +44,50 @@ class ReplyViewpoint(_ReplyPart):
 
     source: str
     xyz: Point
-    heading_rad: float | None = None
+
+
+class ProgramParse(_ReplyPart):
+    """The program that the question was parsed into: as text, and as the JSON of `nodes/grounding/program.py`."""
+
+    text: str
+    program: dict[str, Any]
+    confidence: Score | None  # the model's; null when rules parsed the question
+    reader: str  # "model" or "rules"; "" when the program was given
+
+
+class LayerSelection(_ReplyPart):
+    """Mode "deductive": the ids that the model kept in each layer."""
+
+    floors: list[str] = []
+    rooms: list[str] = []
+    locations: list[str] = []
+    targets: list[str] = []
+    anchors: list[str] = []
 
 
 class Reply(_ReplyPart):
-    """The fields of a reply, always all of them. `Reply.model_json_schema()` is its JSON Schema."""
+    """The fields of a reply; the JSON always has all of them. `Reply.model_json_schema()` is its JSON Schema."""
 
     status: Literal["found", "not_in_map", "error"]
-    error: str | None  # the reason; null unless status is "error"
+    error: str | None = None  # the reason; null unless status is "error"
     question_id: str
     question: str
-    object_id: str | None
-    name: str | None
-    box: Annotated[list[Point], Field(min_length=2, max_length=2)] | None  # min and max
-    center: Point | None
-    path: list[PathStep]
-    approach: ApproachPose | None
-    route: list[str]
-    travel_m: Annotated[float, Field(ge=0)] | None
-    evidence: list[str]
-    candidates: list[RankedObject]
-    parse: dict[str, Any] | str | None
-    sure: bool
-    viewpoint: ReplyViewpoint | None
-    revision: int  # of the graph that was asked; -1: there was none
-    llm_calls: Annotated[int, Field(ge=0)]
-    ms: Annotated[float, Field(ge=0)]  # from the request's arrival to its reply
+    object_id: str | None = None
+    name: str | None = None
+    box: Annotated[list[Point], Field(min_length=2, max_length=2)] | None = None  # min and max
+    center: Point | None = None
+    path: list[PathStep] = []
+    approach: ApproachPose | None = None
+    route: list[str] = []
+    travel_m: Annotated[float, Field(ge=0)] | None = None
+    evidence: list[str] = []
+    candidates: list[RankedObject] = []
+    parse: ProgramParse | LayerSelection | None = None
+    sure: bool = False
+    viewpoint: ReplyViewpoint | None = None
+    revision: int = -1  # of the graph that was asked; -1: there was none
+    llm_calls: Annotated[int, Field(ge=0)] = 0
+    ms: Annotated[float, Field(ge=0)] = 0.0  # from the request's arrival to its reply; the server sets it
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Reply:
@@ -87,28 +105,23 @@ class Reply(_ReplyPart):
             raise ValueError("the object is the first candidate")
         return self
 
-
-def answered(answer: dict[str, Any], ms: float) -> dict[str, Any]:
-    """The reply that carries a node's answer; `ms` since the question arrived, which no node knows."""
-    return {"error": None} | answer | {"ms": round(ms, 1)}
-
-
-def error_reply(reason: str, question_id: str = "", text: str = "", ms: float = 0.0) -> dict[str, Any]:
-    """The reply that says why there is no answer; `ms` since the question arrived."""
-    return {
-        "status": "error",
-        "error": reason,
-        "question_id": question_id,
-        "question": text,
-        **dict.fromkeys(("object_id", "name", "box", "center", "approach", "travel_m", "parse", "viewpoint")),
-        **{field: [] for field in ("path", "route", "evidence", "candidates")},
-        "sure": False,
-        "revision": -1,
-        "llm_calls": 0,
-        "ms": round(ms, 1),
-    }
+    def to_answer_json(self) -> str:
+        """The JSON of an Answer message: without `ms`, which the server sets, and `error` when there is none."""
+        return _canonical(self.model_dump(mode="json", exclude={"ms"} if self.error else {"ms", "error"}))
 
 
-def encode_reply(reply: dict[str, Any]) -> bytes:
-    """A reply as it is sent: UTF-8 JSON with sorted keys."""
-    return json.dumps(reply, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+def reply_json(answer_json: str, ms: float) -> str:
+    """The reply that is sent: a node's answer with all fields, and the milliseconds since the request arrived.
+
+    Canonical: sorted keys, no spaces; equal replies give equal bytes in UTF-8.
+    """
+    return _canonical({"error": None} | json.loads(answer_json) | {"ms": round(ms, 1)})
+
+
+def _canonical(fields: dict[str, Any]) -> str:
+    return json.dumps(fields, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def error_reply(reason: str, question_id: str = "", text: str = "", revision: int = -1) -> Reply:
+    """A reply that says why there is no answer."""
+    return Reply(status="error", error=reason, question_id=question_id, question=text, revision=revision)

@@ -23,6 +23,7 @@ from placegraph.tools.evaluate.grounding_variants import (
     map_scene,
 )
 from placegraph.tools.evaluate.report import number, plain, table
+from placegraph.tools.evaluate.sensitivity import cases_of, sensitivity
 
 HEADS = ("exact id", "Acc@.1", "Acc@.25", "Acc@.5", "Acc@.75", "not in map", "errors", "ms p50", "ms p95", "calls")
 
@@ -38,6 +39,9 @@ def evaluate_grounding(
         str, typer.Option(help=f"With and without what, of: {', '.join(VARIANTS)}.")
     ] = "program,oracle,no relations,flat,rules",
     forms: Annotated[bool, typer.Option("--forms", help="Also by form of question.")] = False,
+    perturb: Annotated[
+        bool, typer.Option("--sensitivity", help="Instead: perturb each number of grounding by 20 %, without a model.")
+    ] = False,
     wrong: Annotated[bool, typer.Option("--wrong", help="Print what the first variant answers wrong.")] = False,
     threads: Annotated[int, typer.Option(min=1, help="Threads of the language model.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
@@ -48,6 +52,9 @@ def evaluate_grounding(
     """
     scenes = _scenes(maps or [], source or [], houses, count)
     runner = VariantRunner(threads)
+    if perturb:
+        _print_sensitivity(scenes, runner)
+        return
     scores: dict[str, dict[str, Any]] = {}
     for i, variant in enumerate(chosen_variants(variants)):
         results = [[runner.ask(variant, scene, asked) for asked in scene.questions] for scene in scenes]
@@ -57,6 +64,17 @@ def evaluate_grounding(
         print(f"{variant}: Acc@.25 {scores[variant]['all']['acc_0.25']:.3f}", file=sys.stderr, flush=True)
     measure = "exact" if houses else "acc_0.25"
     print(json.dumps(plain(scores), sort_keys=True) if as_json else _text(scores, forms, measure))
+
+
+def _print_sensitivity(scenes: Sequence[QuestionScene], runner: VariantRunner) -> None:
+    if not all(scene.true_ids for scene in scenes):
+        raise ConfigError("--sensitivity needs true graphs: --houses A-B")
+    cases = cases_of(scenes, runner)
+    right, rows = sensitivity(cases, runner.names)
+    heads = [f"{len(cases)} programs, {right:.4f} right", "value", "changed -20 %", "+20 %", "right -20 %", "+20 %"]
+    rows.sort(key=lambda row: -sum(row.changed))
+    body = [[r.name, f"{r.value:g}", *map(str, r.changed), *(f"{share:.4f}" for share in r.right)] for r in rows]
+    print(table([heads, *body]))
 
 
 def _scenes(maps: list[Path], source: list[Path], houses: str, count: int) -> list[QuestionScene]:

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import ConfigError, QueryError, SourceError
 from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.messages import Question
+from placegraph.runtime.query.reply import Reply, error_reply
 from placegraph.runtime.query.request import make_question
 from placegraph.runtime.scene_graph import Node, SceneGraph
 from placegraph.tools.evaluate.aligned_map import align_folder
@@ -85,8 +85,8 @@ class VariantRunner:
 
     def __init__(self, threads: int = 1) -> None:
         self.model = LanguageModel(threads=threads, adapter_path=default_adapter_path())
-        names = NameMatcher(TextEncoder().encode)
-        self.reasoner = Reasoner(names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
+        self.names = NameMatcher(TextEncoder().encode)
+        self.reasoner = Reasoner(self.names, self.model, (*ROOM_TYPES, *LOCATION_TYPES), use_model=True)
         self._programs: dict[tuple[str, str], Program] = {}
         self._parse_ms: dict[tuple[str, str], float] = {}  # ms of each reading
         self._saved_ms, self._saved_calls = 0.0, 0  # of a kept reading: added to the time of the variant that uses it
@@ -98,19 +98,18 @@ class VariantRunner:
         self._saved_ms, self._saved_calls = 0.0, 0
         try:
             reply = VARIANTS[variant].answer(self, scene, question)
-        except QueryError:
-            reply = {"status": "error", "object_id": None}
+        except QueryError as error:
+            reply = error_reply(str(error))
         ms = (time.perf_counter() - began) * 1e3 + self._saved_ms
-        calls = self.model.calls - calls + self._saved_calls
-        return QuestionResult(reply["status"], reply["object_id"] or "", calls, ms)
+        return QuestionResult(reply.status, reply.object_id or "", self.model.calls - calls + self._saved_calls, ms)
 
-    def by_mode(self, scene: QuestionScene, question: HouseQuestion, mode: str) -> dict[str, Any]:
+    def by_mode(self, scene: QuestionScene, question: HouseQuestion, mode: str) -> Reply:
         """The answer of one of the product's modes."""
         return self.reasoner.answer(scene.graph, 0, scene.question(question, mode))
 
     def by_program(
         self, scene: QuestionScene, question: HouseQuestion, program: Program, graph: SceneGraph | None = None
-    ) -> dict[str, Any]:
+    ) -> Reply:
         """The answer to a program that is given."""
         return self.reasoner.answer_program(graph or scene.graph, 0, scene.question(question), program)
 
@@ -141,7 +140,7 @@ class Variant:
     """One way to answer, in words and as a function."""
 
     description: str
-    answer: Callable[[VariantRunner, QuestionScene, HouseQuestion], dict[str, Any]]
+    answer: Callable[[VariantRunner, QuestionScene, HouseQuestion], Reply]
 
 
 VARIANTS: Mapping[str, Variant] = {

@@ -14,7 +14,7 @@ from typing import Any
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.messages import Answer, Graph, NamedGraph, Question
 from placegraph.runtime.node import Context, Node, build_node
-from placegraph.runtime.query.reply import answered
+from placegraph.runtime.query.reply import reply_json
 from placegraph.runtime.scene_graph.object_list import SourceId
 from placegraph.runtime.scene_graph.object_list_import import import_graph
 from placegraph.tools.map_files.map_folder import RUN, find_graph, read_config
@@ -64,7 +64,7 @@ class OfflineQuery:
         ms = (time.monotonic() - began_s) * 1e3
         if not answers:
             raise QueryError("the grounding node gave no answer")
-        return with_own_ids(answered(json.loads(answers[0].json), ms), file.ids)
+        return with_own_ids(json.loads(reply_json(answers[0].json, ms)), file.ids)
 
     def _read(self, path: Path) -> _OpenFile:
         scene = import_graph(find_graph(path))

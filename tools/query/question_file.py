@@ -65,12 +65,12 @@ class LineAnswerer:
             question_id = _id(fields)
             reply = self._ask(fields)
         except (QueryError, SchemaError) as error:
-            reply = error_reply(str(error))
+            reply = error_reply(str(error)).model_dump(mode="json")
         except (ModelError, ConfigError):
             raise
         except Exception as error:  # a bug; the other lines can still be answered
             logger.exception("line %d", number)
-            reply = error_reply(f"{type(error).__name__}: {error}")
+            reply = error_reply(f"{type(error).__name__}: {error}").model_dump(mode="json")
         if reply["status"] == "error":
             reply["error"] = f"line {number}: {reply['error']}"
         return {"question_id": question_id} | {name: reply[name] for name in FIELDS}

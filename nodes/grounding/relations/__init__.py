@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 
 from placegraph.nodes.grounding.box_arrays import Boxes, Layout
+from placegraph.nodes.grounding.settings import GroundingSettings
 from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.node import available, plugin
@@ -36,6 +37,11 @@ class RelationQuery:
     viewpoints: ViewpointSelector
     second_anchors: Boxes | None = None
     reference: Boxes | None = None
+
+    @property
+    def settings(self) -> GroundingSettings:
+        """The numbers of all relations."""
+        return self.viewpoints.settings
 
 
 @dataclass(frozen=True, eq=False)

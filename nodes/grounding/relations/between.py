@@ -6,13 +6,10 @@ import numpy as np
 
 from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery
 
-ASIDE_SHARE = 0.5  # departs: distance beside the line, as a share of its length, at which it is half between
-ASIDE_LEAST_M = 0.4  # departs: for anchors that stand close together
-LENGTH_M = 6.0  # departs: of several pairs of a kind the closer pair is meant
-
 
 def evaluate(query: RelationQuery) -> PairFits:
     """All targets and pairs of anchors."""
+    settings = query.settings.between
     first, second = query.anchors, query.second_anchors
     assert first is not None and second is not None
     a, b = first.center[:, :2], second.center[:, :2]
@@ -25,11 +22,11 @@ def evaluate(query: RelationQuery) -> PairFits:
     normal = np.abs(np.stack((-line[:, 1], line[:, 0]), axis=1)) / length[:, None]
     reach = [np.einsum("mk,mk->m", normal, anchor.size[:, :2]) / 2 for anchor in (first, second)]
     aside = np.maximum(aside - np.minimum(*reach), 0)
-    widest = np.maximum(ASIDE_SHARE * length, ASIDE_LEAST_M)
+    widest = np.maximum(settings.aside_share * length, settings.min_aside_m)
     inner = np.clip((0.5 - np.abs(along - 0.5)) * 5, 0, 1)  # a half at a tenth of the way, whole from a fifth on
     rise = np.abs(query.targets.center[:, None, 2] - ((first.center + second.center) / 2)[None, :, 2])
     inner = inner * (1 - 1.2 * np.abs(along - 0.5))  # the nearer to the middle the better
-    values = inner * np.power(0.5, (aside / widest) ** 2 + length / LENGTH_M / 4 + np.maximum(rise - 1, 0))
+    values = inner * np.power(0.5, (aside / widest) ** 2 + length / settings.length_m / 4 + np.maximum(rise - 1, 0))
 
     def sentence(i: int, j: int) -> str:
         ends = f"from {first.labels[j]} to {second.labels[j]}"

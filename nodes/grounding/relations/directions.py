@@ -10,14 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery, axis_gaps_m, decay, distance_m
+from placegraph.nodes.grounding.settings import DirectionSettings
 from placegraph.runtime.arrays import F64
 
-MARGIN_M = 0.1  # departs: about the error of a box centre from a depth camera
-SIDE_SHARE = 0.26  # departs: within 15 degrees of the line of sight nothing is left or right: there the fit is a half
-WITHIN = 0.1  # departs: how much what is within an anchor's width counts towards its side
-SIDE_M, FRONT_M = 3.0, 1.5  # departs: "left of the sofa" means beside it, not anywhere in that half of the room
-MILD = 0.75  # departs: how well what is close by on the other side is "in front", when nobody said who looks
-ACROSS_M = 0.8  # departs: what is nearer is beside, not across
 DEGREES_45 = 0.7
 
 
@@ -25,6 +20,7 @@ def evaluate(query: RelationQuery) -> PairFits:
     """All pairs."""
     anchors = query.anchors
     assert anchors is not None
+    settings = query.settings.directions
     sights = query.viewpoints.lines_of_sight(anchors)
     offset = (query.targets.center[:, None] - anchors.center[None])[..., :2]
     left = np.einsum("nmk,mk->nm", offset, sights.left)
@@ -36,18 +32,20 @@ def evaluate(query: RelationQuery) -> PairFits:
     blind = np.asarray(~sights.forward.any(axis=1))
     if query.relation in ("left", "right"):
         main = left if query.relation == "left" else -left
-        share = _direction_fit(main, wide, np.abs(ahead) - deep)
-        values = np.where(blind, 0.5, share) * decay(gap, SIDE_M)
+        share = _direction_fit(main, wide, np.abs(ahead) - deep, settings)
+        values = np.where(blind, 0.5, share) * decay(gap, settings.half_side_m)
     elif query.relation in ("front", "behind"):
         main = ahead if query.relation == "behind" else -ahead
-        share = _direction_fit(main, deep, np.abs(left) - wide)
+        share = _direction_fit(main, deep, np.abs(left) - wide, settings)
         unsaid = sights.trust < 1
-        mild = MILD + (1 - MILD) * share
-        values = np.where(unsaid | blind, np.where(blind, MILD, mild), share) * decay(gap, FRONT_M)
+        mild = settings.unstated_fit + (1 - settings.unstated_fit) * share
+        values = np.where(unsaid | blind, np.where(blind, settings.unstated_fit, mild), share) * decay(
+            gap, settings.half_front_m
+        )
     else:
         share = -ahead / np.maximum(np.linalg.norm(offset, axis=2), 1e-9)
         straight = decay(np.maximum(np.abs(left) - wide, 0), 2.0)
-        values = np.clip(0.5 + (share - DEGREES_45), 0, 1) * np.clip(gap / (2 * ACROSS_M), 0, 1) * straight
+        values = np.clip(0.5 + (share - DEGREES_45), 0, 1) * np.clip(gap / (2 * settings.across_m), 0, 1) * straight
 
     def sentence(i: int, j: int) -> str:
         a, b = query.targets.labels[i], anchors.labels[j]
@@ -64,17 +62,17 @@ def evaluate(query: RelationQuery) -> PairFits:
     return PairFits(values, sentence, trust=trust)
 
 
-def _direction_fit(main: F64, half: F64, cross: F64) -> F64:
+def _direction_fit(main: F64, half: F64, cross: F64, settings: DirectionSettings) -> F64:
     """Fit 0..1 of a direction: 1 from 45 degrees off the other axis on, 0.5 at 15 degrees, 0 on the other side.
 
     main (n, m): metres from the anchor's centre in the direction, of which half (m,) lie within the anchor.
     cross (n, m): metres beyond the anchor's edge across the direction, so that what stands before the left end of a
     sofa is before it and hardly to its left.
     """
-    beyond = np.maximum(main - half, 0) + WITHIN * np.maximum(main, 0)
+    beyond = np.maximum(main - half, 0) + settings.within_share * np.maximum(main, 0)
     share = np.where(main > 0, beyond / np.maximum(np.hypot(beyond, np.maximum(cross, 0)), 1e-9), -1.0)
-    fit = np.clip(0.5 + (share - SIDE_SHARE) * 0.5 / (DEGREES_45 - SIDE_SHARE), 0.0, 1.0)
-    return np.asarray(fit * np.clip(main / MARGIN_M - 0.5, 0, 1))
+    fit = np.clip(0.5 + (share - settings.min_share) * 0.5 / (DEGREES_45 - settings.min_share), 0.0, 1.0)
+    return np.asarray(fit * np.clip(main / settings.margin_m - 0.5, 0, 1))
 
 
 RELATION = Relation(

@@ -11,15 +11,11 @@ from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery
 from placegraph.runtime.arrays import F64
 
-THIRD = 0.25  # departs: how much the shortest side counts
-SIZE_MARGIN = 0.05  # departs: log of size; 5 % is below what boxes from a depth camera can tell
-HEIGHT_MARGIN_M = 0.05  # departs: as above, in metres
 
-
-def log_size(boxes: Boxes) -> F64:
+def log_size(boxes: Boxes, short_side: float) -> F64:
     """(N,) logarithm of how large things look."""
     sides = np.sort(np.maximum(boxes.size, 0.02), axis=1)
-    return np.asarray(np.log(sides[:, 2]) + np.log(sides[:, 1]) + THIRD * np.log(sides[:, 0]))
+    return np.asarray(np.log(sides[:, 2]) + np.log(sides[:, 1]) + short_side * np.log(sides[:, 0]))
 
 
 def length_m(boxes: Boxes) -> F64:
@@ -34,9 +30,9 @@ def evaluate(query: RelationQuery) -> PairFits:
     if name in ("largest", "smallest"):
         volume = np.prod(boxes.size, axis=1)
         return PairFits(
-            sign * log_size(boxes)[:, None],
+            sign * log_size(boxes, query.settings.appearance.short_side)[:, None],
             lambda i, _: f"{boxes.labels[i]} fills a box of {volume[i]:.3f} m3",
-            SIZE_MARGIN,
+            query.settings.nearness.margin_m,
         )
     if name in ("tallest", "shortest"):
         values, words = boxes.size[:, 2], "{} is {:.2f} m tall"
@@ -44,7 +40,9 @@ def evaluate(query: RelationQuery) -> PairFits:
         values, words = length_m(boxes), "{} is {:.2f} m long"
     else:
         values, words = boxes.center[:, 2], "the middle of {} is at a height of {:.2f} m"
-    return PairFits(sign * values[:, None], lambda i, _: words.format(boxes.labels[i], values[i]), HEIGHT_MARGIN_M)
+    return PairFits(
+        sign * values[:, None], lambda i, _: words.format(boxes.labels[i], values[i]), query.settings.nearness.margin_m
+    )
 
 
 RELATION = Relation(

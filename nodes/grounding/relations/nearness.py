@@ -18,15 +18,7 @@ from placegraph.nodes.grounding.relations import (
     distance_m,
     horizontal_distance_m,
 )
-from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST
 from placegraph.runtime.arrays import F64
-
-NEAR_M = 1.5  # departs: farther than about two steps nothing is "near" in a home
-AGAINST_M = 0.3  # departs: "touching" of boxes whose surfaces are some centimetres off
-WALL_M = 0.4  # departs: furniture stands off a wall a little, and room boxes end inside the wall
-THROUGH_WALL_M = 3.0  # departs: added between rooms; what is behind a wall or a ceiling is not close for people
-MARGIN_M = 0.05  # departs: distances that differ by less cannot be told apart by these boxes
-MIDDLES = 0.1  # departs: share of the distance of middles that tells apart what touches the same thing
 
 
 def in_different_rooms(targets: Boxes, anchors: Boxes) -> F64:
@@ -38,21 +30,27 @@ def in_different_rooms(targets: Boxes, anchors: Boxes) -> F64:
 
 def _rank_by_viewer_distance(query: RelationQuery) -> PairFits:
     """Ranks without an anchor: by the distance to the viewer, else to the reference, else to the room's centre."""
+    settings = query.settings.nearness
     sign = -1.0 if query.relation == "closest" else 1.0
     if query.viewpoints.explicit is None and query.reference is not None:
         by_reference = _rank_by_anchor_distance(
             RelationQuery(query.relation, query.targets, query.reference, query.layout, query.viewpoints)
         )
-        return PairFits(by_reference.values[:, :1], by_reference.sentence, MARGIN_M, MIDDLE_TRUST)
+        return PairFits(
+            by_reference.values[:, :1],
+            by_reference.sentence,
+            settings.margin_m,
+            query.settings.viewpoint.unstated_trust,
+        )
     viewpoint = query.viewpoints.overlooking(query.targets)
     center = query.targets.center[:, :2]
     low, high = query.targets.low[:, :2], query.targets.high[:, :2]
     distance = np.linalg.norm(np.maximum(np.maximum(low - viewpoint.eye, viewpoint.eye - high), 0), axis=1)
-    distance = distance + MIDDLES * np.linalg.norm(center - viewpoint.eye, axis=1)
+    distance = distance + settings.center_share * np.linalg.norm(center - viewpoint.eye, axis=1)
     return PairFits(
         sign * distance[:, None],
         lambda i, _: f"{query.targets.labels[i]} is {distance[i]:.2f} m from the {viewpoint.source}",
-        MARGIN_M,
+        settings.margin_m,
         viewpoint.trust,
     )
 
@@ -60,7 +58,7 @@ def _rank_by_viewer_distance(query: RelationQuery) -> PairFits:
 def _rank_by_anchor_distance(query: RelationQuery) -> PairFits:
     if query.anchors is None:
         return _rank_by_viewer_distance(query)
-    anchors = query.anchors
+    anchors, settings = query.anchors, query.settings.nearness
     gap = distance_m(axis_gaps_m(query.targets, anchors))
     through = in_different_rooms(query.targets, anchors)
     middles = np.linalg.norm(query.targets.center[:, None] - anchors.center[None], axis=2)
@@ -70,22 +68,26 @@ def _rank_by_anchor_distance(query: RelationQuery) -> PairFits:
         other = ", in another room" if through[i, j] else ""
         return f"{query.targets.labels[i]} is {gap[i, j]:.2f} m from {anchors.labels[j]}{other}"
 
-    return PairFits(sign * (gap + MIDDLES * middles + THROUGH_WALL_M * through), sentence, MARGIN_M)
+    return PairFits(
+        sign * (gap + settings.center_share * middles + settings.through_wall_m * through), sentence, settings.margin_m
+    )
 
 
 def evaluate(query: RelationQuery) -> PairFits:
     """All pairs."""
     if query.relation in ("closest", "farthest"):
         return _rank_by_anchor_distance(query)
-    anchors = query.anchors
+    anchors, settings = query.anchors, query.settings.nearness
     assert anchors is not None
     gaps = axis_gaps_m(query.targets, anchors)
     gap = distance_m(gaps)
     if query.relation == "near":
-        values = decay(gap, NEAR_M)
+        values = decay(gap, settings.half_near_m)
     else:
-        shells = np.array([not one for one in anchors.ids], bool)[None]  # the walls of a room's box
-        values = np.where(shells, decay(horizontal_distance_m(gaps), WALL_M), decay(gap, AGAINST_M))
+        shells = anchors.is_part()[None]  # the walls of a room's box
+        values = np.where(
+            shells, decay(horizontal_distance_m(gaps), settings.half_wall_m), decay(gap, settings.half_against_m)
+        )
     return PairFits(values, lambda i, j: f"{query.targets.labels[i]} is {gap[i, j]:.2f} m from {anchors.labels[j]}")
 
 

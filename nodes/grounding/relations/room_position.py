@@ -11,11 +11,6 @@ from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery, axis_gaps_m, decay, distance_m
 from placegraph.runtime.arrays import F64
 
-CORNER_M = 0.8  # departs: from a corner, at which it is half in it
-MIDDLE_SHARE = 0.35  # departs: distance from the middle as a share of the half size, at which it is half in the middle
-END_M = 1.0  # departs: from the end of a thing
-FACING_COSINE = 0.5  # departs: within 60 degrees of its front
-
 
 def _room_boxes(query: RelationQuery) -> tuple[F64, F64]:
     rooms = query.targets.room
@@ -29,14 +24,18 @@ def _corner(query: RelationQuery) -> PairFits:
         gaps = np.minimum(np.abs(low - room_low[:, :2]), np.abs(room_high[:, :2] - high))
         away = np.linalg.norm(gaps, axis=1)[:, None]
         words = "the nearest corner of its room"
-        return PairFits(decay(away, CORNER_M), lambda i, _: _distance_sentence(query, i, away[i, 0], words))
+        return PairFits(
+            decay(away, query.settings.room_position.half_corner_m),
+            lambda i, _: _distance_sentence(query, i, away[i, 0], words),
+        )
     a, b = query.anchors.low[None, :, :2], query.anchors.high[None, :, :2]
     gaps_low = np.maximum(np.maximum(low[:, None] - a, a - high[:, None]), 0)
     gaps_high = np.maximum(np.maximum(low[:, None] - b, b - high[:, None]), 0)
     away = np.linalg.norm(np.minimum(gaps_low, gaps_high), axis=2)
     labels = query.anchors.labels
     return PairFits(
-        decay(away, CORNER_M), lambda i, j: _distance_sentence(query, i, away[i, j], f"a corner of {labels[j]}")
+        decay(away, query.settings.room_position.half_corner_m),
+        lambda i, j: _distance_sentence(query, i, away[i, j], f"a corner of {labels[j]}"),
     )
 
 
@@ -53,12 +52,13 @@ def _center(query: RelationQuery) -> PairFits:
     else:
         middle = query.anchors.center[None, :, :2]
         half = np.maximum(query.anchors.size[None, :, :2] / 2, 0.3)
-        names = list(query.anchors.labels)
+        names = [str(label) for label in query.anchors.labels]
     aside = np.abs(center[:, None] - middle)
     share = np.linalg.norm(aside / np.maximum(half, 0.01), axis=2) / np.sqrt(2)
     away = np.linalg.norm(aside, axis=2)
     return PairFits(
-        decay(share, MIDDLE_SHARE), lambda i, j: _distance_sentence(query, i, away[i, j], f"the middle of {names[j]}")
+        decay(share, query.settings.room_position.half_center_share),
+        lambda i, j: _distance_sentence(query, i, away[i, j], f"the middle of {names[j]}"),
     )
 
 
@@ -72,7 +72,8 @@ def _end(query: RelationQuery) -> PairFits:
     low, high = query.targets.low[:, None, :2], query.targets.high[:, None, :2]
     away = np.min([np.linalg.norm(np.maximum(np.maximum(low - e, e - high), 0), axis=2) for e in ends], axis=0)
     return PairFits(
-        decay(away, END_M), lambda i, j: _distance_sentence(query, i, away[i, j], f"an end of {anchors.labels[j]}")
+        decay(away, query.settings.room_position.half_end_m),
+        lambda i, j: _distance_sentence(query, i, away[i, j], f"an end of {anchors.labels[j]}"),
     )
 
 
@@ -107,7 +108,7 @@ def _facing(query: RelationQuery) -> PairFits:
     cosine = np.einsum("nk,nmk->nm", query.targets.front, direction)
     known = bool(np.isfinite(query.targets.front).all(axis=1).any())
     near = decay(distance_m(axis_gaps_m(query.targets, anchors)), 4.0)
-    turned = np.clip(0.5 + (cosine - FACING_COSINE), 0, 1) * (0.5 + 0.5 * near)
+    turned = np.clip(0.5 + (cosine - query.settings.room_position.facing_cosine), 0, 1) * (0.5 + 0.5 * near)
     values = np.where(np.isfinite(cosine), turned, 0.5 + 0.2 * near)  # not known: of several the nearest
 
     def sentence(i: int, j: int) -> str:

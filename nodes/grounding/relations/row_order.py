@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.nodes.grounding.relations import PairFits, Relation, RelationQuery, axis_gaps_m, distance_m
-from placegraph.nodes.grounding.viewpoint import MIDDLE_TRUST, Viewpoint
+from placegraph.nodes.grounding.viewpoint import ROOM_CENTER, Viewpoint, ViewpointKind, ViewpointSource
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 
-MARGIN_M = 0.1  # departs: peers have no margin; about the error of a box centre from a depth camera
-DOOR_NAMES = ("door", "doorway", "doorframe", "entrance", "door frame")
+DOOR_NAMES = word_list("doors")
 
 
 def _lateral_order(query: RelationQuery, viewpoint: Viewpoint) -> F64:
@@ -21,32 +21,45 @@ def _lateral_order(query: RelationQuery, viewpoint: Viewpoint) -> F64:
     offset = query.targets.center[:, :2] - viewpoint.eye
     ahead, left = offset @ viewpoint.forward, offset @ np.array([-viewpoint.forward[1], viewpoint.forward[0]])
     # before a wall or a row the order is that across the line of sight, from a point it is that of the bearings
-    if not len(left) or viewpoint.source.startswith("place before") or not (ahead > 0.3).all():
+    if not len(left) or viewpoint.source.kind is ViewpointKind.BEFORE or not (ahead > 0.3).all():
         return np.asarray(left)
     return np.asarray(np.arctan2(left, ahead) * float(np.linalg.norm(offset, axis=1).mean()))
 
 
 def _viewpoint_at_door(query: RelationQuery) -> Viewpoint | None:
     """The view into the room from its only door: "the back of the room" without a viewpoint is meant from there."""
-    doors = [i for i, label in enumerate(query.layout.all.labels) if label.rsplit(" ", 1)[0] in DOOR_NAMES]
+    doors = [i for i, label in enumerate(query.layout.all.labels) if label.name in DOOR_NAMES]
     rooms = set(query.targets.room.tolist())
     doors = [i for i in doors if int(query.layout.all.room[i]) in rooms]
     if len(doors) != 1 or len(rooms) != 1:
         return None
     door = query.layout.all.take(doors)
     forward = -query.viewpoints.facing_direction(door, 0)
-    return Viewpoint(door.labels[0], door.center[0, :2], forward, MIDDLE_TRUST) if forward.any() else None
+    return (
+        Viewpoint(
+            ViewpointSource(ViewpointKind.AT, door.labels),
+            door.center[0, :2],
+            forward,
+            query.settings.viewpoint.unstated_trust,
+        )
+        if forward.any()
+        else None
+    )
 
 
 def evaluate(query: RelationQuery) -> PairFits:
     """One value per target, greatest first; for `middle` and `nth` the position along the row from the left."""
-    targets = query.targets
+    targets, margin_m = query.targets, query.settings.directions.margin_m
     if query.relation == "nth" and bool(targets.is_place.all()):  # the second bedroom: in the order of their ids
         values = -np.arange(len(targets), dtype=float)
         return PairFits(values[:, None], lambda i, _: f"{targets.labels[i]} by its id", 0.0)
     if query.relation == "nth" and query.viewpoints.explicit is None and query.reference is not None:
         gap = distance_m(axis_gaps_m(targets, query.reference)).min(axis=1)
-        return PairFits(-gap[:, None], lambda i, _: f"{targets.labels[i]} is {gap[i]:.2f} m from there", MARGIN_M)
+        return PairFits(
+            -gap[:, None],
+            lambda i, _: f"{targets.labels[i]} is {gap[i]:.2f} m from there",
+            margin_m,
+        )
     viewpoint = query.viewpoints.overlooking(targets, query.reference)
     if (
         query.relation == "nth"
@@ -56,9 +69,13 @@ def evaluate(query: RelationQuery) -> PairFits:
         # "the first bed as you come in": from a place, the nearest comes first
         away = np.linalg.norm(targets.center[:, :2] - viewpoint.eye, axis=1)
         words = f"m from the {viewpoint.source}"
-        return PairFits(-away[:, None], lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {words}", MARGIN_M)
+        return PairFits(
+            -away[:, None],
+            lambda i, _: f"{targets.labels[i]} is {away[i]:.2f} {words}",
+            margin_m,
+        )
     if query.relation in ("frontmost", "backmost"):
-        if viewpoint.source == "room centre":
+        if viewpoint.source is ROOM_CENTER:
             viewpoint = _viewpoint_at_door(query) or viewpoint
         assert viewpoint.forward is not None
         ahead = (targets.center[:, :2] - viewpoint.eye) @ viewpoint.forward
@@ -73,8 +90,8 @@ def evaluate(query: RelationQuery) -> PairFits:
         words = "m to the left of their middle"
     sentence = f"{words}, seen from the {viewpoint.source}"
     return PairFits(
-        values[:, None], lambda i, _: f"{targets.labels[i]} is {ahead[i]:+.2f} {sentence}", MARGIN_M, viewpoint.trust
-    )  # fmt: skip
+        values[:, None], lambda i, _: f"{targets.labels[i]} is {ahead[i]:+.2f} {sentence}", margin_m, viewpoint.trust
+    )
 
 
 def _along_row(query: RelationQuery, left: F64) -> F64:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from placegraph.nodes.grounding.box_arrays import Boxes
+from placegraph.nodes.grounding.box_arrays import Boxes, RoomPart
 from placegraph.nodes.grounding.relations import (
     PairFits,
     Relation,
@@ -18,124 +18,122 @@ from placegraph.nodes.grounding.relations import (
     footprint_overlap,
     horizontal_distance_m,
 )
+from placegraph.nodes.grounding.settings import SupportSettings
+from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 
-CONTACT_M = 0.15  # departs: gap between what lies and what carries it, at which it is half likely to lie on it
-STANDS_SHARE = 0.5  # departs: what stands in the upper half of a box stands on it: a bed's box includes its headboard
-HANGS_M, HANGS_SHARE = 0.1, 0.7  # departs: what touches an upright thing, off its bottom, hangs on it ("on the wall")
-WITHIN_SHARE, ON_SHARE = 0.8, 0.9  # departs: how well what is inside is "on", and what is on top is "in"
-FLOOR_M = 0.1  # departs: the floor of a room's box is as low as the lowest thing in it
-SPOT_M, CORNER_M = 0.02, 0.8  # departs: "in the corner": a corner or middle of a room is no box that holds things
-OFF_GROUND_M = 0.3
-WALL_M = 0.4  # departs: room boxes end inside the wall or beyond it
-ASIDE_M = 0.3  # departs: a picture hangs above the sofa that it does not overlap; half as likely at this distance
-RISE_M = 3.0  # departs: of two things above the table, the closer one is meant, a little
-MIX_M = 0.1  # departs: heights that differ by less are level
-INSIDE_SHARE = 0.7  # departs: share of the target's volume within the anchor's box from which on it is inside
-TUCKED, TUCKED_M = 0.6, 0.2  # departs: how well that is "under", and the gap that halves it
-OPEN_BELOW = ("table", "desk", "chair", "bed", "bench", "stool", "sofa", "couch", "armchair", "piano", "sink")
-RAISED = 0.3  # departs: what is within the box of these is in or on them only when it is off the floor by this share
-GROWN_M = 0.05  # departs: the anchor's box is grown by this, for what was measured of its walls
-PART_M, BESIDE_M = 0.1, 0.75  # departs: "with" also means a part that touches, and what stands right beside
+OPEN_BELOW = word_list("open_below")
 
 
-def on_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+def on_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettings) -> F64:
     """(n, m) fit: the target rests on the anchor or hangs on it."""
     over = footprint_overlap(targets, anchors, gaps)
     gap = targets.low[:, None, 2] - anchors.high[None, :, 2]
     height = anchors.size[None, :, 2]
-    raised = (targets.low[:, None, 2] - anchors.low[None, :, 2]) / (STANDS_SHARE * height)
+    raised = (targets.low[:, None, 2] - anchors.low[None, :, 2]) / (settings.stands_share * height)
     # a bottom below the anchor's top: for thin anchors this is noise, for thick ones its height within them counts
-    sunk = np.maximum(np.clip(raised, 0, 1), decay(-gap, CONTACT_M))
+    sunk = np.maximum(np.clip(raised, 0, 1), decay(-gap, settings.half_contact_m))
     above_middle = targets.center[:, None, 2] > anchors.center[None, :, 2]
-    rests = np.clip(over * 1.25, 0, 1) * np.where(gap > 0, decay(gap, CONTACT_M), sunk * above_middle)
-    off = (targets.low[:, None, 2] - anchors.low[None, :, 2]) > OFF_GROUND_M
+    rests = np.clip(over * 1.25, 0, 1) * np.where(gap > 0, decay(gap, settings.half_contact_m), sunk * above_middle)
+    off = (targets.low[:, None, 2] - anchors.low[None, :, 2]) > settings.off_floor_m
     upright = anchors.size[None, :, 2] > targets.size[:, None, 2]
-    hangs = HANGS_SHARE * decay(distance_m(gaps), HANGS_M) * off * upright
+    hangs = settings.hanging_fit * decay(distance_m(gaps), settings.half_touch_m) * off * upright
     return np.maximum(rests, hangs)
 
 
-def under_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+def under_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettings) -> F64:
     """(n, m) fit: the target is lower than the anchor and below it or nearly below it."""
     over = footprint_overlap(targets, anchors, gaps, smaller=True)
     rise = anchors.center[None, :, 2] - targets.center[:, None, 2]
     apart = anchors.low[None, :, 2] - targets.high[:, None, 2]  # negative: they overlap in height
-    lower = np.clip(0.5 + rise / (2 * MIX_M), 0, 1)
+    lower = np.clip(0.5 + rise / (2 * settings.level_m), 0, 1)
     # without overlapping footprints it must be entirely lower: what stands beside a table is not under it
-    aside = 0.8 * decay(horizontal_distance_m(gaps), ASIDE_M) * np.clip(0.5 + (apart + MIX_M) / (2 * MIX_M), 0, 1)
-    below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * decay(apart, RISE_M)
+    aside = (
+        0.8
+        * decay(horizontal_distance_m(gaps), settings.half_aside_m)
+        * np.clip(0.5 + (apart + settings.level_m) / (2 * settings.level_m), 0, 1)
+    )
+    below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * decay(apart, settings.half_rise_m)
     # a chair tucked under a desk is mostly before it, and its back rises above the desk's middle
-    legs = np.array([_has_legs(label) for label in anchors.labels], bool)[None]
-    stands = (targets.low[:, None, 2] - anchors.low[None, :, 2]) < OFF_GROUND_M
+    legs = np.array([label.head_noun in ("desk", "table") for label in anchors.labels], bool)[None]
+    stands = (targets.low[:, None, 2] - anchors.low[None, :, 2]) < settings.off_floor_m
     lowered = targets.center[:, None, 2] < anchors.high[None, :, 2]
-    return np.maximum(below, TUCKED * legs * stands * lowered * decay(horizontal_distance_m(gaps), TUCKED_M))
+    return np.maximum(
+        below,
+        settings.tucked_fit * legs * stands * lowered * decay(horizontal_distance_m(gaps), settings.half_tucked_m),
+    )
 
 
-def in_fit(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+def in_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettings) -> F64:
     """(n, m) fit: most of the target's volume is within the anchor; for a room: the target belongs to it."""
     half = targets.size / 2
-    low = np.maximum((targets.center - half)[:, None], anchors.low[None] - GROWN_M)
-    high = np.minimum((targets.center + half)[:, None], anchors.high[None] + GROWN_M)
+    low = np.maximum((targets.center - half)[:, None], anchors.low[None] - settings.grown_m)
+    high = np.minimum((targets.center + half)[:, None], anchors.high[None] + settings.grown_m)
     share = np.prod(np.clip(high - low, 0, None), axis=2) / np.prod(2 * half, axis=1)[:, None]
-    fit = np.clip(share * 0.5 / INSIDE_SHARE, 0, 1)
-    legs = np.array([_is_open_below(label) for label in anchors.labels], bool)[None]
-    raised = np.clip((targets.low[:, None, 2] - anchors.low[None, :, 2]) / (RAISED * anchors.size[None, :, 2]), 0, 1)
+    fit = np.clip(share * 0.5 / settings.inside_share, 0, 1)
+    legs = np.array([label.head_noun in OPEN_BELOW for label in anchors.labels], bool)[None]
+    raised = np.clip(
+        (targets.low[:, None, 2] - anchors.low[None, :, 2]) / (settings.raised_share * anchors.size[None, :, 2]), 0, 1
+    )
     share = np.where(legs, share * raised, share)
     fit = np.where(legs, fit * raised, fit)
-    rooms = np.array([bool(node_id) and node_id[0] == "R" for node_id in anchors.ids], bool)
+    rooms = np.array([label.layer == "room" for label in anchors.labels], bool)
     same = targets.room[:, None] == anchors.room[None]
     return np.where(rooms[None] & (anchors.room >= 0)[None], same.astype(float), np.where(share > 0.95, 1.0, fit))
 
 
-def _has_legs(label: str) -> bool:
-    return label.rsplit(" ", 2)[-2] in ("desk", "table") if " " in label else False
-
-
-def _is_open_below(label: str) -> bool:
-    return label.rsplit(" ", 2)[-2] in OPEN_BELOW if " " in label else False
-
-
 def evaluate(query: RelationQuery) -> PairFits:
     """All pairs. "In" also holds for what lies on top (books in a shelf, a cup in the sink)."""
-    targets, anchors = query.targets, query.anchors
+    targets, anchors, settings = query.targets, query.anchors, query.settings.support
     assert anchors is not None
     gaps = axis_gaps_m(targets, anchors)
     name = query.relation
     if name == "on":
         # a cup within the box of a shelf, rack or counter with a back wall is "on" it, too
-        values = np.maximum(on_fit(targets, anchors, gaps), WITHIN_SHARE * in_fit(targets, anchors, gaps))
-        values = _with_room_parts(targets, anchors, gaps, values)
+        values = np.maximum(
+            on_fit(targets, anchors, gaps, settings),
+            settings.inside_or_on_fit * in_fit(targets, anchors, gaps, settings),
+        )
+        values = _with_room_parts(query, anchors, gaps, values)
     elif name == "in":
-        values = np.maximum(in_fit(targets, anchors, gaps), ON_SHARE * on_fit(targets, anchors, gaps))
-        values = _with_room_parts(targets, anchors, gaps, values)
+        values = np.maximum(
+            in_fit(targets, anchors, gaps, settings),
+            settings.inside_or_on_fit * on_fit(targets, anchors, gaps, settings),
+        )
+        values = _with_room_parts(query, anchors, gaps, values)
     elif name == "under":
-        values = under_fit(targets, anchors, gaps)
+        values = under_fit(targets, anchors, gaps, settings)
     elif name == "above":
-        values = under_fit(anchors, targets, gaps.swapaxes(0, 1)).T
+        values = under_fit(anchors, targets, gaps.swapaxes(0, 1), settings).T
     else:
-        values = _holds(targets, anchors, gaps)
+        values = _holds(targets, anchors, gaps, settings)
         if name == "with":
             gap = distance_m(gaps)
-            values = np.maximum(values, np.maximum(0.9 * decay(gap, PART_M), 0.7 * decay(gap, BESIDE_M)))
+            values = np.maximum(
+                values, np.maximum(0.9 * decay(gap, settings.half_touch_m), 0.7 * decay(gap, settings.half_beside_m))
+            )
     return PairFits(values, lambda i, j: _sentence(query, i, j))
 
 
-def _with_room_parts(targets: Boxes, anchors: Boxes, gaps: F64, values: F64) -> F64:
+def _with_room_parts(query: RelationQuery, anchors: Boxes, gaps: F64, values: F64) -> F64:
     """The fits (n, m) of "on" and "in", replaced where the anchor is a wall, floor or corner of a room."""
-    is_room_part = np.array([not node_id for node_id in anchors.ids], bool)
-    is_wall, is_floor = is_room_part & (anchors.size[:, 2] > 1.0), is_room_part & (anchors.size[:, 2] <= FLOOR_M)
-    is_spot = is_room_part & (anchors.size[:, :2].max(axis=1, initial=0) <= SPOT_M)
+    targets, settings = query.targets, query.settings.support
+    is_wall = anchors.is_part(RoomPart.WALL, RoomPart.ROOM)
+    is_floor = anchors.is_part(RoomPart.FLOOR, RoomPart.CEILING)
+    is_spot = anchors.is_part(RoomPart.CORNER, RoomPart.CENTER)
     aside_m = horizontal_distance_m(gaps)
-    off = targets.low[:, None, 2] - anchors.low[None, :, 2] > OFF_GROUND_M
-    above = targets.low[:, None, 2] - anchors.high[None, :, 2] - FLOOR_M
-    values = np.where(is_wall[None], HANGS_SHARE * decay(aside_m, WALL_M) * off, values)
-    values = np.where(is_floor[None], decay(above, CONTACT_M) * (aside_m <= 0), values)
-    return np.where(is_spot[None], decay(aside_m, CORNER_M), values)
+    off = targets.low[:, None, 2] - anchors.low[None, :, 2] > settings.off_floor_m
+    above = targets.low[:, None, 2] - anchors.high[None, :, 2] - settings.floor_m
+    values = np.where(
+        is_wall[None], settings.hanging_fit * decay(aside_m, query.settings.nearness.half_wall_m) * off, values
+    )
+    values = np.where(is_floor[None], decay(above, settings.half_contact_m) * (aside_m <= 0), values)
+    return np.where(is_spot[None], decay(aside_m, query.settings.room_position.half_corner_m), values)
 
 
-def _holds(targets: Boxes, anchors: Boxes, gaps: F64) -> F64:
+def _holds(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettings) -> F64:
     turned = gaps.swapaxes(0, 1)
-    return np.maximum(on_fit(anchors, targets, turned), in_fit(anchors, targets, turned)).T
+    return np.maximum(on_fit(anchors, targets, turned, settings), in_fit(anchors, targets, turned, settings)).T
 
 
 def _sentence(query: RelationQuery, i: int, j: int) -> str:
@@ -153,7 +151,7 @@ def _sentence(query: RelationQuery, i: int, j: int) -> str:
         aside = float(horizontal_distance_m(gaps)[0, 0])
         beside = f"{over:.0%} of it {'over' if rise > 0 else 'under'} it" if over else f"{aside:.2f} m aside"
         return f"{a} is {abs(rise):.2f} m {word} than {b}, {beside}"
-    inside = float(in_fit(subject, support, gaps)[0, 0])
+    inside = float(in_fit(subject, support, gaps, query.settings.support)[0, 0])
     if name == "in" and inside >= 0.5:
         return f"{a} is within {b}"
     gap = float(subject.low[0, 2] - support.high[0, 2])

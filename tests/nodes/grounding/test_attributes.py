@@ -3,25 +3,28 @@ import dataclasses
 import numpy as np
 import pytest
 
-from placegraph.nodes.grounding.attributes import BASIC_COLORS, UNKNOWN_FIT, appearance_fits, color_fit, size_fit
+from placegraph.nodes.grounding.attributes import BASIC_COLORS, appearance_fits, color_fit, size_fit
 from placegraph.nodes.grounding.box_arrays import layout_of
+from placegraph.nodes.grounding.settings import AppearanceSettings
 from placegraph.runtime.scene_graph import Node, SceneGraph
+
+SETTINGS = AppearanceSettings()
 
 
 def test_unseen_colour_neither_fits_nor_fails(thing_of):
-    assert color_fit(thing_of(0, "R0", "cup", (0, 0, 0), (1, 1, 1)), "red") == UNKNOWN_FIT
+    assert color_fit(thing_of(0, "R0", "cup", (0, 0, 0), (1, 1, 1)), "red", SETTINGS) == 0.5
 
 
 @pytest.mark.parametrize("name", sorted(BASIC_COLORS))
 def test_each_colour_is_called_by_its_name(thing_of, name):
     node = thing_of(0, "R0", "cup", (0, 0, 0), (1, 1, 1), BASIC_COLORS[name])
-    fits = {other: color_fit(node, other) for other in BASIC_COLORS}
+    fits = {other: color_fit(node, other, SETTINGS) for other in BASIC_COLORS}
     assert max(fits, key=fits.get) == name
     assert sorted(fits.values())[-2] < 0.75
 
 
 def test_a_tag_that_says_the_colour_wins(thing_of):
-    assert color_fit(thing_of(0, "R0", "red cup", (0, 0, 0), (1, 1, 1), (0, 0, 255)), "red") == 1
+    assert color_fit(thing_of(0, "R0", "red cup", (0, 0, 0), (1, 1, 1), (0, 0, 255)), "red", SETTINGS) == 1
 
 
 def boxes_of(nodes):
@@ -34,16 +37,16 @@ def boxes_of(nodes):
 
 
 def fits(words, *nodes):
-    return appearance_fits(words, nodes, boxes_of(nodes), np.ones(len(nodes), bool))
+    return appearance_fits(words, nodes, boxes_of(nodes), np.ones(len(nodes), bool), SETTINGS)
 
 
 def test_size_is_a_rank(thing_of):
     nodes = [thing_of(i, "R0", "box", (4, 4, 4), (size,) * 3) for i, size in enumerate((1, 3, 2))]
     every = np.ones(3, bool)
-    assert size_fit(boxes_of([]), "large", np.ones(0, bool)).tolist() == []
-    assert size_fit(boxes_of(nodes[:1]), "small", every[:1]).tolist() == [1.0]
-    assert size_fit(boxes_of(nodes), "large", every).tolist() == pytest.approx([0.4, 1.0, 0.7])
-    assert size_fit(boxes_of(nodes), "small", every).tolist() == pytest.approx([1.0, 0.4, 0.7])
+    assert size_fit(boxes_of([]), "large", np.ones(0, bool), SETTINGS).tolist() == []
+    assert size_fit(boxes_of(nodes[:1]), "small", every[:1], SETTINGS).tolist() == [1.0]
+    assert size_fit(boxes_of(nodes), "large", every, SETTINGS).tolist() == pytest.approx([0.4, 1.0, 0.7])
+    assert size_fit(boxes_of(nodes), "small", every, SETTINGS).tolist() == pytest.approx([1.0, 0.4, 0.7])
     assert fits("big", *nodes).values.argmax() == 1
 
 

@@ -40,7 +40,7 @@ def test_an_empty_graph_asks_nothing(model, names, places):
     before = model.calls
     for nodes in (places[:1], places[:2], places):
         reading, ranking = deduce(model, ProgramExecutor(SceneGraph.of(nodes), names, NOWHERE), "the lamp")
-        assert (reading.targets, ranking.candidates) == ((), [])
+        assert (reading.targets, ranking.candidates) == ([], [])
         assert "nothing in the map" in ranking.notes[-1]
     assert model.calls == before
 
@@ -56,7 +56,7 @@ def test_one_floor_and_no_room_named_ask_for_objects_only(model, names, places, 
     graph, before = SceneGraph.of([*places, *things]), model.calls
     reading, ranking = deduce(model, ProgramExecutor(graph, names, NOWHERE), "the lamp near the bed")
     assert model.calls - before == 2  # which objects, and which one
-    assert (reading.floors, reading.rooms, reading.locations) == (("F0",), ("R0",), ())
+    assert (reading.floors, reading.rooms, reading.locations) == (["F0"], ["R0"], [])
     assert reading.targets and set(reading.targets) | set(reading.anchors) <= {"O0", "O1", "O2"}
     assert {candidate.node.id for candidate in ranking.candidates} <= set(reading.targets)
 

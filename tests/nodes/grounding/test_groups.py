@@ -4,6 +4,7 @@ import pytest
 from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.nodes.grounding.groups import group_fits
 from placegraph.nodes.grounding.program_syntax import parse_program
+from placegraph.nodes.grounding.settings import GroupSettings
 
 
 @pytest.fixture
@@ -11,7 +12,9 @@ def fits(room_of):
     def make(condition, *xs):
         layout = layout_of(room_of(*(("cup", (x, 0, 0), (0.2, 0.2, 0.2)) for x in xs), ("end", (99, 0, 0), (1, 1, 1))))
         things = layout.all.take(range(len(xs)))
-        return group_fits(things, np.arange(len(xs)), next(iter(parse_program(f"cup; {condition}").conditions)))
+        return group_fits(
+            things, np.arange(len(xs)), next(iter(parse_program(f"cup; {condition}").conditions)), GroupSettings()
+        )
 
     return make
 

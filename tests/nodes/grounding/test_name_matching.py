@@ -1,17 +1,9 @@
 import pytest
 
-from placegraph.nodes.grounding.name_matching import (
-    COSINE,
-    FAIR,
-    HEAD,
-    KIND,
-    MEMBER,
-    SAME,
-    SHARED,
-    SLIP,
-    SYNONYM,
-    is_misspelling,
-)
+from placegraph.nodes.grounding.name_matching import is_misspelling
+from placegraph.nodes.grounding.settings import NameSettings
+
+N = NameSettings()
 
 
 def test_nothing_is_like_nothing(names):
@@ -23,11 +15,14 @@ def test_nothing_is_like_nothing(names):
 
 @pytest.mark.parametrize(
     ("noun", "tag", "score"),
-    [("chairs", "Chair", SAME), ("chair", "office chair", KIND), ("couch", "sofa", SYNONYM), ("mug", "cup", SYNONYM),
-     ("wooden chair", "chair", HEAD), ("chair", "zebra", 0),
-     ("duffel bag", "bag", SYNONYM + SHARED), ("duffel bag", "backpack", SYNONYM), ("trashcan", "trash can", SAME),
-     ("dry erase board", "whiteboard", SYNONYM), ("seats", "armchair", MEMBER), ("bookshlef", "bookshelf", SLIP),
-     ("angel staute", "statue", HEAD * SLIP), ("leather couch", "sofa", HEAD * SYNONYM),
+    [("chairs", "Chair", N.same), ("chair", "office chair", N.kind), ("couch", "sofa", N.synonym),
+     ("mug", "cup", N.synonym),
+     ("wooden chair", "chair", N.head), ("chair", "zebra", 0),
+     ("duffel bag", "bag", N.synonym + N.shared_word_bonus), ("duffel bag", "backpack", N.synonym),
+     ("trashcan", "trash can", N.same),
+     ("dry erase board", "whiteboard", N.synonym), ("seats", "armchair", N.member),
+     ("bookshlef", "bookshelf", N.misspelled),
+     ("angel staute", "statue", N.head * N.misspelled), ("leather couch", "sofa", N.head * N.synonym),
      ("mug", "rug", 0), ("glass", "window", 0),
      ("table", "tablecloth", 0)],
 )  # fmt: skip
@@ -49,10 +44,10 @@ SAME_KIND = [
 
 
 def test_the_cosine_threshold_parts_the_pairs(names):
-    assert max(names.cosine(a, b) for a, b in OTHER_KIND) < COSINE
+    assert max(names.cosine(a, b) for a, b in OTHER_KIND) < N.min_cosine
     assert (
         min(names.cosine(a, b) for a, b in [("fridge", "refrigerator"), ("couch", "sofa"), ("tv", "television")])
-        > COSINE
+        > N.min_cosine
     )
 
 
@@ -90,7 +85,7 @@ def test_what_is_fairly_called_so_is_taken_where_nothing_is(names, house):
     objects = house.layer("object")
     fair = names.nearest_matches("sofas", objects)
     assert {fit.node.name for fit in fair} == {"sofa"}
-    assert all(fit.score >= FAIR for fit in fair)
+    assert all(fit.score >= N.min_nearest_cosine for fit in fair)
     assert (
         names.nearest_matches("zebra", objects)
         == names.nearest_matches("", objects)

@@ -80,8 +80,8 @@ def test_a_program_that_is_given_is_executed(house, names, question_of):
     reasoner = Reasoner(names, LanguageModel(), (), use_model=False)
     program = Program(target=parse_program("lamp; on (nightstand)"))
     answer = reasoner.answer_program(house, 4, question_of("whatever"), program)
-    assert (answer["object_id"], answer["revision"], answer["llm_calls"]) == ("O18", 4, 0)
-    assert answer["parse"]["text"] == "lamp; on (nightstand)"
+    assert (answer.object_id, answer.revision, answer.llm_calls) == ("O18", 4, 0)
+    assert answer.parse.text == "lamp; on (nightstand)"
 
 
 def test_the_viewpoint_turns_left_into_right(node, ask):

@@ -3,6 +3,7 @@ import pytest
 
 from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.nodes.grounding.scoring import ScoredCandidates
+from placegraph.nodes.grounding.settings import ScoreSettings
 
 
 def words(i):
@@ -15,7 +16,7 @@ def scored(room_of):
         things = [("cup", (i, 0, 0), (0.1, 0.1, 0.1)) for i in range(len(names))]
         layout = layout_of(room_of(*things, ("end", (9, 0, 0), (1, 1, 1))))
         boxes = layout.all.take(range(len(names)))
-        return ScoredCandidates(boxes, layout.nodes[: len(names)], np.array(names), narrowed=narrowed)
+        return ScoredCandidates(boxes, layout.nodes[: len(names)], np.array(names), ScoreSettings(), narrowed=narrowed)
 
     return make
 

@@ -8,6 +8,10 @@ NOBODY = np.full(3, np.nan)
 CENTER = ("room centre", [3.0, 2.5])
 
 
+def words(lines):
+    return tuple(map(str, lines.sources))
+
+
 @pytest.fixture
 def layout(room_of):
     """A room of 6 x 5 m: a bed with its head to the west, a tv on the east wall, two windows in the north wall."""
@@ -37,11 +41,11 @@ def test_several_are_seen_towards_the_wall_that_most_are_on(layout):
 
 def test_the_order_of_preference(layout):
     tv = layout.all.take([2])
-    assert ViewpointSelector(layout, NOBODY).lines_of_sight(tv).sources == ("room centre",)
+    assert words(ViewpointSelector(layout, NOBODY).lines_of_sight(tv)) == ("room centre",)
     asked = ViewpointSelector(layout, np.array([1.0, 1.0, 1.5]))
-    assert asked.lines_of_sight(tv).sources == ("asker",)
+    assert words(asked.lines_of_sight(tv)) == ("asker",)
     asked.requested = asked.at(layout.all.take([1]))
-    assert asked.lines_of_sight(tv).sources == ("bed O1",)
+    assert words(asked.lines_of_sight(tv)) == ("bed O1",)
     assert (
         asked.lines_of_sight(tv).trust.tolist()
         == [1.0]
@@ -54,7 +58,7 @@ def test_a_front_is_seen_by_who_faces_it(room_of):
     lines = ViewpointSelector(layout, NOBODY).lines_of_sight(layout.all.take([0]))
     assert lines.forward.tolist() == [[1.0, 0.0]]
     assert lines.left.tolist() == [[0.0, 1.0]]
-    assert lines.sources == ("front of desk O0",)
+    assert words(lines) == ("front of desk O0",)
 
 
 def test_away_from_a_thing_is_the_way_opposite_to_facing_it(layout):
@@ -68,7 +72,7 @@ def test_of_several_doors_each_room_has_its_own(house):
     windows = layout.all.take([layout.row[i] for i in ("O8", "O14", "O20")])
     viewpoints.requested = viewpoints.at(windows)
     things = layout.all.take([layout.row[i] for i in ("O0", "O9", "O15")])
-    assert viewpoints.lines_of_sight(things).sources == ("window O8", "window O14", "window O20")
+    assert words(viewpoints.lines_of_sight(things)) == ("window O8", "window O14", "window O20")
 
 
 def test_a_room_without_a_door_of_its_own_is_seen_by_the_asker(house):
@@ -78,7 +82,7 @@ def test_a_room_without_a_door_of_its_own_is_seen_by_the_asker(house):
         viewpoints = ViewpointSelector(layout, asker)
         viewpoints.requested = viewpoints.at(layout.all.take([layout.row["O9"]]))
         lines = viewpoints.lines_of_sight(bed)  # the sofa is downstairs in another room
-        assert (lines.sources, lines.trust.tolist()) == ((source,), [trust])
+        assert (words(lines), lines.trust.tolist()) == ((source,), [trust])
 
 
 def test_nothing_is_seen_without_error(layout):

@@ -5,7 +5,7 @@ import pytest
 
 from placegraph.runtime.messages import Question
 from placegraph.runtime.query.query_server import MAX_WAITING, QueryServer
-from placegraph.runtime.query.reply import Reply
+from placegraph.runtime.query.reply import Reply, error_reply
 
 
 class Asker:
@@ -16,6 +16,10 @@ class Asker:
 
     def reply(self, payload: bytes) -> None:
         self.replies.append(json.loads(payload))
+
+
+def answer(text: str = "an answer") -> str:
+    return error_reply(text).to_answer_json()
 
 
 @pytest.fixture
@@ -33,10 +37,10 @@ def test_each_asker_gets_its_own_answer_once(forwarded: list) -> None:
         server.receive(asker)  # type: ignore[arg-type]
     (first, question), (second, _) = forwarded
     assert question.question_id == "same" and server.is_waiting(first)
-    server.answer(second, '{"n": 2}')
-    server.answer(first, '{"n": 1}')
-    server.answer(first, '{"n": 3}')
-    assert [[reply["n"] for reply in asker.replies] for asker in askers] == [[1], [2]]
+    server.answer(second, answer("two"))
+    server.answer(first, answer("one"))
+    server.answer(first, answer("three"))
+    assert [[reply["error"] for reply in asker.replies] for asker in askers] == [["one"], ["two"]]
 
 
 def test_a_bad_request_is_answered_and_not_forwarded(forwarded: list) -> None:
@@ -53,7 +57,7 @@ def test_the_time_from_arrival_to_reply_is_told(forwarded: list) -> None:
     server, asker = query_server(forwarded), Asker()
     server.receive(asker)  # type: ignore[arg-type]
     time.sleep(0.05)
-    server.answer(forwarded[0][0], "{}")
+    server.answer(forwarded[0][0], answer())
     assert 50 <= asker.replies[0]["ms"] < 5000
 
 
@@ -64,7 +68,7 @@ def test_too_many_are_told_so_and_a_place_gets_free_again(forwarded: list) -> No
     busy = Reply.model_validate(askers[-1].replies[0])
     assert len(forwarded) == MAX_WAITING and "busy: 16 questions are waiting" in (busy.error or "")
     assert (busy.question_id, busy.question) == ("same", "cup")
-    server.answer(forwarded[0][0], "{}")
+    server.answer(forwarded[0][0], answer())
     late = Asker()
     server.receive(late)  # type: ignore[arg-type]
     assert len(forwarded) == MAX_WAITING + 1 and late.replies == []
@@ -89,5 +93,5 @@ def test_a_slow_node_is_answered_for(forwarded: list) -> None:
     reply = Reply.model_validate(asker.replies[0])
     assert (reply.error, reply.question_id) == ("no answer within 0.05 s", "same") and reply.ms >= 50
     assert not server.is_waiting(forwarded[0][0])
-    server.answer(forwarded[0][0], "{}")
+    server.answer(forwarded[0][0], answer())
     assert len(asker.replies) == 1
