@@ -1,6 +1,6 @@
 from placegraph.nodes.grounding.settings import DEFAULTS
 from placegraph.tools.evaluate import sensitivity as module
-from placegraph.tools.evaluate.ablations import VariantRunner, house_scene
+from placegraph.tools.evaluate.grounding_variants import VariantRunner, house_scene
 from placegraph.tools.evaluate.sensitivity import cases_of, sensitivity
 
 
