@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from placegraph.runtime.errors import QueryError
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.runtime.scene_graph.json_types import rounded
 from placegraph.runtime.scene_graph.route import Route, find_route
 from placegraph.tools.map_files.map_folder import read_graph
@@ -41,7 +41,7 @@ def path(
     print(json.dumps(as_dict(graph, route, a, b), sort_keys=True) if as_json else as_text(graph, route, a, b))
 
 
-def find_place(graph: SceneGraph, text: str) -> Node:
+def find_place(graph: SceneGraph, text: str) -> GraphNode:
     """The room, location or object with an id or a name; rooms before locations before objects.
 
     Raises QueryError when there is none, or several in the first layer that has the name.
@@ -63,7 +63,7 @@ def find_place(graph: SceneGraph, text: str) -> Node:
     raise QueryError(f"nothing in the map is called {text!r}; its rooms: {rooms}")
 
 
-def as_dict(graph: SceneGraph, route: Route, start: Node, goal: Node) -> dict[str, Any]:
+def as_dict(graph: SceneGraph, route: Route, start: GraphNode, goal: GraphNode) -> dict[str, Any]:
     """A route for JSON; lengths in metres."""
     steps = []
     for i in route.ids:
@@ -85,7 +85,7 @@ def as_dict(graph: SceneGraph, route: Route, start: Node, goal: Node) -> dict[st
     }
 
 
-def as_text(graph: SceneGraph, route: Route, start: Node, goal: Node) -> str:
+def as_text(graph: SceneGraph, route: Route, start: GraphNode, goal: GraphNode) -> str:
     """A route as lines of text."""
     lines = [f"{_label(start)} to {_label(goal)}: {route.length_m:.2f} m{' or more' if route.straight else ''}"]
     for i in route.ids:
@@ -103,5 +103,5 @@ def as_text(graph: SceneGraph, route: Route, start: Node, goal: Node) -> str:
     return "\n".join(lines)
 
 
-def _label(node: Node) -> str:
+def _label(node: GraphNode) -> str:
     return f"{node.id} {node.name}" if node.tags else node.id

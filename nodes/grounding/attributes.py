@@ -20,7 +20,7 @@ from placegraph.nodes.grounding.settings import AppearanceSettings
 from placegraph.nodes.grounding.word_lists import word_list, word_table
 from placegraph.runtime.arrays import F64, Bool
 from placegraph.runtime.language.word_forms import tokens
-from placegraph.runtime.scene_graph import Node
+from placegraph.runtime.scene_graph import GraphNode
 
 # sRGB of the eleven basic colour terms (Berlin and Kay) and beige, as in CSS but for brown, green and pink,
 # which in homes are duller than their CSS namesakes.
@@ -45,7 +45,7 @@ class AppearanceFits:
 
 
 def appearance_fits(
-    words: str, nodes: Sequence[Node], boxes: Boxes, among: Bool, settings: AppearanceSettings
+    words: str, nodes: Sequence[GraphNode], boxes: Boxes, among: Bool, settings: AppearanceSettings
 ) -> AppearanceFits:
     """How well each of n nodes fits the words of an `is` condition; among (n,): the nodes whose sizes are compared."""
     content_words = [word for word in tokens(words.replace("-", " ")) if word not in FILLER_WORDS]
@@ -88,12 +88,12 @@ def _color_stem(word: str) -> str:
     return next((name for name in (stem, stem + "e", re.sub(r"(.)\1$", r"\1", stem)) if name in COLORS), word)
 
 
-def _is_tagged(node: Node, word: str) -> bool:
+def _is_tagged(node: GraphNode, word: str) -> bool:
     return any(word in tokens(tag.name) for tag in node.tags)
 
 
 def _colors(
-    nodes: Sequence[Node], color: str, shade: float, content_words: Sequence[str], settings: AppearanceSettings
+    nodes: Sequence[GraphNode], color: str, shade: float, content_words: Sequence[str], settings: AppearanceSettings
 ) -> tuple[F64, bool]:
     tagged = np.array(
         [any(_is_tagged(node, word) for word in content_words if _color_stem(word) in COLORS) for node in nodes], bool
@@ -123,7 +123,7 @@ def _color_fits(lab: F64, color: str, shade: float, settings: AppearanceSettings
     return np.asarray(np.exp(-excess / settings.color_falloff))
 
 
-def color_fit(node: Node, color: str, settings: AppearanceSettings) -> float:
+def color_fit(node: GraphNode, color: str, settings: AppearanceSettings) -> float:
     """How well `color` names an object's median colour, 0..1; 1 when it is the nearest basic colour."""
     return float(_colors([node], color, 0.0, [color], settings)[0][0])
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.runtime.arrays import F64
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 
 STEP_RAD = np.radians(0.25)
 SHARPNESS = 10.0  # a box 12 degrees off a direction votes for it with 0.04 of its weight
@@ -34,7 +34,7 @@ def rotation_z(yaw: float) -> F64:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def rotated_box(node: Node, yaw: float) -> F64:
+def rotated_box(node: GraphNode, yaw: float) -> F64:
     """(2, 3) axis-aligned box of a node after a rotation by yaw (rad) about z, from its oriented box or footprint."""
     rotation = rotation_z(yaw)
     if node.oriented_box:

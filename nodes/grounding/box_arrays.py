@@ -16,7 +16,7 @@ import numpy as np
 
 from placegraph.nodes.grounding.axis_alignment import building_yaw, rotated_box, rotation_z
 from placegraph.runtime.arrays import F64, I64, Bool
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 
 SHELL_M = 0.05  # thickness of a wall, floor or ceiling that the map does not hold; chosen by hand
 
@@ -116,9 +116,9 @@ def concatenate(parts: Sequence[Boxes]) -> Boxes:
 class Layout:
     """A graph as arrays. Rows of `all` and `nodes`: objects by id, then floors, rooms and locations."""
 
-    nodes: tuple[Node, ...]
+    nodes: tuple[GraphNode, ...]
     all: Boxes
-    rooms: tuple[Node, ...]
+    rooms: tuple[GraphNode, ...]
     room_low: F64  # (R + 1, 3) m; the last row, index -1, is the building
     room_high: F64
     places: I64  # rows

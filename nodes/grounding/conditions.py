@@ -24,7 +24,7 @@ from placegraph.nodes.grounding.scoring import ScoredCandidates
 from placegraph.nodes.grounding.search_scope import SearchScope, match_places, narrow_scope
 from placegraph.nodes.grounding.viewpoint import ViewpointSelector
 from placegraph.runtime.language.word_forms import normal_form
-from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, id_key
 
 MAX_PAIRS = 600_000  # pairs of targets and anchors evaluated at once; bounds memory on large maps
 SURFACE_NAMES = ("wall", "floor", "ceiling")  # never meant by "something", "what is under the bed"
@@ -69,7 +69,7 @@ class ConditionScorer:
         """The boxes of matched nodes."""
         return self.layout.all.take([self.layout.row[fit.node.id] for fit in matches])
 
-    def rank_places(self, place: Thing, matches: Sequence[NameMatch]) -> list[Node]:
+    def rank_places(self, place: Thing, matches: Sequence[NameMatch]) -> list[GraphNode]:
         """The matched places that fit the place's conditions best; all of them when it has none."""
         if not place.conditions:
             return [fit.node for fit in matches]
@@ -84,7 +84,7 @@ class ConditionScorer:
         fits: the candidates' nodes with the scores of their names; None when boxes are parts of rooms.
         target: the request's target, whose noun "one" stands for.
         """
-        nodes: list[Node | None] = [fit.node for fit in matches] if matches else [None] * len(boxes)
+        nodes: list[GraphNode | None] = [fit.node for fit in matches] if matches else [None] * len(boxes)
         scores = np.array([fit.score for fit in matches]) if matches else np.ones(len(boxes))
         conditions = [condition for condition in thing.conditions if condition.kind in SCORED_KINDS]
         scored = ScoredCandidates(boxes, nodes, scores, self.settings.scores, narrowed=bool(conditions))

@@ -26,7 +26,7 @@ from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.language.prompts import safe_name
 from placegraph.runtime.language.word_forms import tokens
 from placegraph.runtime.query.reply import LayerSelection
-from placegraph.runtime.scene_graph import Node, id_key
+from placegraph.runtime.scene_graph import GraphNode, id_key
 
 # Chosen by hand, so that a layer fits one call of a small model.
 MAX_LISTED = 48  # entries of a layer that are shown; of more the best by name
@@ -41,11 +41,11 @@ OTHERS = 0.5  # score of a target that was not chosen; the model gives no number
 class _LevelNodes:
     """Nodes of one layer that may be or hold the target, and those that may be or hold the anchors."""
 
-    targets: Sequence[Node]
-    anchors: Sequence[Node]
+    targets: Sequence[GraphNode]
+    anchors: Sequence[GraphNode]
 
     @property
-    def both(self) -> list[Node]:
+    def both(self) -> list[GraphNode]:
         return sorted({node.id: node for node in (*self.targets, *self.anchors)}.values(), key=lambda n: id_key(n.id))
 
     @property
@@ -91,16 +91,16 @@ class _DeductiveSearch:
         )
         return levels, self._ground(targets, anchors)
 
-    def _below(self, floors: Sequence[Node]) -> list[Node]:
+    def _below(self, floors: Sequence[GraphNode]) -> list[GraphNode]:
         return [room for floor in floors for room in self._graph.children(floor.id)]
 
-    def _parts(self, rooms: Sequence[Node]) -> list[Node]:
+    def _parts(self, rooms: Sequence[GraphNode]) -> list[GraphNode]:
         """The locations of rooms, and each room that has objects outside of its locations."""
         children = {room.id: self._graph.children(room.id) for room in rooms}
         loose = [room for room in rooms if any(node.layer == "object" for node in children[room.id])]
         return [*loose, *(node for room in rooms for node in children[room.id] if node.layer == "location")]
 
-    def _things(self, places: Sequence[Node]) -> list[Node]:
+    def _things(self, places: Sequence[GraphNode]) -> list[GraphNode]:
         return [node for place in places for node in self._graph.children(place.id) if node.layer == "object"]
 
     def _narrow(self, layer: str, within: _LevelNodes) -> _LevelNodes:
@@ -125,11 +125,11 @@ class _DeductiveSearch:
             [by_id[node_id] for node_id in selection.targets], anchors or ([] if layer == "object" else within.targets)
         )
 
-    def _ranked(self, nodes: Sequence[Node]) -> list[Node]:
+    def _ranked(self, nodes: Sequence[GraphNode]) -> list[GraphNode]:
         """The nodes by how well words of the question name them or their contents; equal ones by id."""
         similarity: dict[str, float] = {}
 
-        def fit(node: Node) -> float:
+        def fit(node: GraphNode) -> float:
             names = {tag.name for tag in node.tags} | (
                 {content.name for content in self._contents(node)} - {node.layer}
             )
@@ -141,7 +141,7 @@ class _DeductiveSearch:
 
         return sorted(nodes, key=lambda node: (-fit(node), id_key(node.id)))
 
-    def _contents(self, node: Node) -> list[Node]:
+    def _contents(self, node: GraphNode) -> list[GraphNode]:
         """What describes a place: a floor's rooms, a room's or location's objects."""
         if node.layer == "object":
             return []
@@ -150,7 +150,7 @@ class _DeductiveSearch:
         below = self._graph.children(node.id)
         return [node for child in below for node in ([child] if child.layer == "object" else self._things([child]))]
 
-    def _described(self, node: Node) -> str:
+    def _described(self, node: GraphNode) -> str:
         if node.layer == "object":
             return self._object(node)
         counted = Counter(
@@ -160,7 +160,7 @@ class _DeductiveSearch:
         inside = f" in {self._name(self._graph.nodes[node.parent])} {node.parent}" if node.layer == "location" else ""
         return f"{self._name(node)}{inside} ({holds or 'nothing named'})"
 
-    def _object(self, node: Node) -> str:
+    def _object(self, node: GraphNode) -> str:
         names = [name for tag in node.tags[:MAX_TAGS] if (name := safe_name(tag.name))] or [node.layer]
         color = (
             max(BASIC_COLORS, key=lambda name: color_fit(node, name, self._executor.settings.appearance))
@@ -171,10 +171,10 @@ class _DeductiveSearch:
         place = self._name(self._graph.nodes[node.parent])
         return ", ".join(part for part in (names[0] + other_names, color, f"in {place}") if part)
 
-    def _name(self, node: Node) -> str:
+    def _name(self, node: GraphNode) -> str:
         return safe_name(node.name, node.layer)
 
-    def _ground(self, targets: Sequence[Node], anchors: Sequence[Node]) -> Ranking:
+    def _ground(self, targets: Sequence[GraphNode], anchors: Sequence[GraphNode]) -> Ranking:
         """The last call, on the small graph of targets and their edges."""
         ranking = Ranking(notes=self._notes, sure=False)
         if not targets:
@@ -202,7 +202,7 @@ class _DeductiveSearch:
         return ranking
 
     def _small_graph(
-        self, targets: Sequence[Node], anchors: Sequence[Node]
+        self, targets: Sequence[GraphNode], anchors: Sequence[GraphNode]
     ) -> tuple[list[Entry], dict[str, list[str]]]:
         """The targets with as many edges as fit one call, if need be fewer targets; and all edges by target id."""
         edges_of = {node.id: edges(self._executor, node, anchors, MAX_EDGES) for node in targets}
@@ -214,7 +214,7 @@ class _DeductiveSearch:
             entries.pop()
         return entries, edges_of
 
-    def _with_edges(self, node: Node, edge_texts: Sequence[str]) -> str:
+    def _with_edges(self, node: GraphNode, edge_texts: Sequence[str]) -> str:
         size = " x ".join(f"{side:.1f}" for side in np.ptp(node.box, axis=0))
         return "; ".join([f"{self._object(node)}, {size} m", *edge_texts])
 

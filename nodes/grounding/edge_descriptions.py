@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from placegraph.nodes.grounding.program_executor import ProgramExecutor
 from placegraph.nodes.grounding.relations import HOLDS, RelationQuery, relations_by_name
 from placegraph.runtime.language.prompts import safe_name
-from placegraph.runtime.scene_graph import Node
+from placegraph.runtime.scene_graph import GraphNode
 from placegraph.runtime.vision.geometry import box_distance_m
 
 # The paper has left, right, front, back, above and below; "on", "in" and "under" are added because people use them.
@@ -21,7 +21,7 @@ MARGIN = 0.1  # by which a relation must fit better than its opposite; both may 
 WORDS = {"left": "left of", "right": "right of", "front": "in front of"}  # as they read before a noun
 
 
-def edges(executor: ProgramExecutor, target: Node, anchors: Sequence[Node], max_count: int) -> list[str]:
+def edges(executor: ProgramExecutor, target: GraphNode, anchors: Sequence[GraphNode], max_count: int) -> list[str]:
     """Texts like `0.40 m from bed O7, left of bed O7`, one for each of the target's max_count nearest anchors."""
     anchors_left = [anchor for anchor in anchors if anchor.id != target.id]
     gaps = [box_distance_m(target.box, anchor.box) for anchor in anchors_left]
@@ -29,7 +29,7 @@ def edges(executor: ProgramExecutor, target: Node, anchors: Sequence[Node], max_
     return [_edge(executor, target, anchors_left[i], gaps[i]) for i in nearest]
 
 
-def _edge(executor: ProgramExecutor, target: Node, anchor: Node, gap_m: float) -> str:
+def _edge(executor: ProgramExecutor, target: GraphNode, anchor: GraphNode, gap_m: float) -> str:
     graph = executor.graph
     apart = ", in another room" if graph.room_of(target.id) != graph.room_of(anchor.id) else ""
     name = f"{safe_name(anchor.name, anchor.layer)} {anchor.id}"
@@ -44,7 +44,7 @@ def _edge(executor: ProgramExecutor, target: Node, anchor: Node, gap_m: float) -
     return ", ".join([f"{gap_m:.2f} m from {name}{apart}", *(f"{word} {name}" for word in words)])
 
 
-def _fit(executor: ProgramExecutor, relation: str, target: Node, anchor: Node) -> float:
+def _fit(executor: ProgramExecutor, relation: str, target: GraphNode, anchor: GraphNode) -> float:
     layout = executor.layout
     target_box, anchor_box = (layout.all.take([layout.row[node.id]]) for node in (target, anchor))
     fits = relations_by_name()[relation].evaluate(

@@ -10,7 +10,7 @@ import numpy as np
 from placegraph.nodes.grounding.settings import DEFAULTS, NameSettings
 from placegraph.runtime.arrays import F32
 from placegraph.runtime.language.word_forms import hyponyms, normal_form, synonyms
-from placegraph.runtime.scene_graph import ID_PATTERN, Node
+from placegraph.runtime.scene_graph import ID_PATTERN, GraphNode
 
 Encode = Callable[[Sequence[str]], F32]  # texts to (N, D) unit rows; a zero row for an empty text
 
@@ -23,7 +23,7 @@ MAX_KEPT = 50_000  # pairs of words whose likeness is remembered
 class NameMatch:
     """A node, how well a noun names it (0..1), and the tag that gave this score."""
 
-    node: Node
+    node: GraphNode
     score: float
     tag: str
 
@@ -65,7 +65,7 @@ class NameMatcher:
         """Cosine of two phrases' embeddings."""
         return float(self._in_front_of_row(a) @ self._in_front_of_row(b))
 
-    def _encode_tags(self, nodes: Sequence[Node]) -> None:
+    def _encode_tags(self, nodes: Sequence[GraphNode]) -> None:
         """Encode all tags of the nodes in one batch, which is a hundred times as fast as one by one."""
         if len(self._rows) >= MAX_KEPT:
             self._rows.clear()
@@ -80,7 +80,7 @@ class NameMatcher:
             self._rows[text] = self._encode([text])[0]
         return self._rows[text]
 
-    def match(self, noun: str, node: Node) -> NameMatch:
+    def match(self, noun: str, node: GraphNode) -> NameMatch:
         """The best match over a node's tags. An id names exactly its node; an empty noun names everything."""
         if not noun:
             return NameMatch(node, 1.0, node.name)
@@ -88,7 +88,7 @@ class NameMatcher:
             return NameMatch(node, float(noun.upper() == node.id), node.id)
         return self._best(noun, node, self.similarity)
 
-    def _best(self, noun: str, node: Node, similarity: Callable[[str, str], float]) -> NameMatch:
+    def _best(self, noun: str, node: GraphNode, similarity: Callable[[str, str], float]) -> NameMatch:
         best = NameMatch(node, 0.0, "")
         strongest = max((tag.weight for tag in node.tags), default=0.0)
         for tag in node.tags:
@@ -98,12 +98,12 @@ class NameMatcher:
                 best = NameMatch(node, score, tag.name)
         return best
 
-    def matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
+    def matches(self, noun: str, nodes: Sequence[GraphNode]) -> list[NameMatch]:
         """All nodes that the noun names with a score above 0, in the order given."""
         self._encode_tags(nodes)
         return [match for match in (self.match(noun, node) for node in nodes) if match.score > 0]
 
-    def nearest_matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
+    def nearest_matches(self, noun: str, nodes: Sequence[GraphNode]) -> list[NameMatch]:
         """For a noun that names nothing: the nodes with the most similar names, if they are similar enough."""
         if not noun or ID_PATTERN.fullmatch(noun.upper()):
             return []
@@ -119,17 +119,17 @@ class NameMatcher:
     def _cosine_similarity(self, noun: str, tag: str) -> float:
         return max(self.cosine(noun, normal_form(tag)), 0.0)
 
-    def best_matches(self, noun: str, nodes: Sequence[Node]) -> list[NameMatch]:
+    def best_matches(self, noun: str, nodes: Sequence[GraphNode]) -> list[NameMatch]:
         """The nodes whose score is within `tie` of the best, in the order given."""
         matches = self.matches(noun, nodes)
         best = max((match.score for match in matches), default=0.0)
         return [match for match in matches if match.score >= best - self.settings.tie]
 
-    def is_known(self, noun: str, nodes: Iterable[Node]) -> bool:
+    def is_known(self, noun: str, nodes: Iterable[GraphNode]) -> bool:
         """Whether the noun names any of the nodes."""
         return any(self.match(noun, node).score > 0 for node in nodes)
 
-    def nearest_names(self, noun: str, nodes: Iterable[Node], max_count: int = NEAREST_NAMES) -> list[str]:
+    def nearest_names(self, noun: str, nodes: Iterable[GraphNode], max_count: int = NEAREST_NAMES) -> list[str]:
         """The names in the map that are the most similar to a noun, best first."""
         names = sorted({node.tags[0].name for node in nodes if node.tags})
         if not names or not noun:

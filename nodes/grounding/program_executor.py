@@ -23,7 +23,7 @@ from placegraph.nodes.grounding.viewpoint import ASKER, ROOM_CENTER, ViewpointSe
 from placegraph.nodes.grounding.word_lists import word_list
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.language.word_forms import normal_form
-from placegraph.runtime.scene_graph import Node, SceneGraph, id_key
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, id_key
 
 MAX_LISTED = (
     50  # candidates with evidence; as many as a request may ask for (MAX_CANDIDATES of runtime/query/request.py)
@@ -62,7 +62,7 @@ class ProgramExecutor:
             self.layout, self.layout.from_world(asker_world), heading_rad - self.layout.yaw, settings
         )
 
-    def viewpoint(self, node: Node) -> ReportedViewpoint:
+    def viewpoint(self, node: GraphNode) -> ReportedViewpoint:
         """From where a node is seen: what the request names, else the asker, else the centre of the node's room."""
         viewpoint = self.viewpoints.explicit
         height = float(node.center[2])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from placegraph.runtime.scene_graph import Node
+from placegraph.runtime.scene_graph import GraphNode
 
 
 @dataclass
 class Candidate:
     """One candidate with its score 0..1, its evidence sentences, and whether every condition holds."""
 
-    node: Node
+    node: GraphNode
     score: float
     evidence: list[str] = field(default_factory=list)
     holds: bool = True

@@ -30,7 +30,7 @@ from placegraph.runtime.language.word_forms import normal_form, tokens
 from placegraph.runtime.messages import Question
 from placegraph.runtime.query.reply import LayerSelection, ProgramParse, Reply
 from placegraph.runtime.query.request import MODES
-from placegraph.runtime.scene_graph import ID_PATTERN, Node, SceneGraph
+from placegraph.runtime.scene_graph import ID_PATTERN, GraphNode, SceneGraph
 
 MAX_OPTIONS = 24  # names offered for a purpose; each costs the model 30 to 60 ms
 # Confidence below which a reading gives way to the deductive mode. Measured: of 300 requests of people and of phrasings
@@ -185,7 +185,7 @@ class Reasoner:
         return parse_by_rules(text, is_place, is_known)
 
     @staticmethod
-    def _is_tag(phrase: str, objects: Sequence[Node]) -> bool:
+    def _is_tag(phrase: str, objects: Sequence[GraphNode]) -> bool:
         return any(normal_form(tag.name) == normal_form(phrase) for node in objects for tag in node.tags[:1])
 
     def _by_purpose(self, program: Program, scope: SearchScope) -> Program:

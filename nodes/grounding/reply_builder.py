@@ -24,7 +24,7 @@ from placegraph.runtime.query.reply import (
     ReplyViewpoint,
     error_reply,
 )
-from placegraph.runtime.scene_graph import Node
+from placegraph.runtime.scene_graph import GraphNode
 from placegraph.runtime.scene_graph.route import find_route
 
 MAX_ELSEWHERE = 5  # objects of that name in other places that are listed; chosen by hand
@@ -93,7 +93,7 @@ class ReplyBuilder:
             **self._common(graph.building),
         )
 
-    def _common(self, seen: Node) -> dict[str, Any]:
+    def _common(self, seen: GraphNode) -> dict[str, Any]:
         viewpoint = self.executor.viewpoint(seen)
         return {
             "question": self.question.text,
@@ -104,7 +104,7 @@ class ReplyBuilder:
             "viewpoint": ReplyViewpoint(source=str(viewpoint.source), xyz=_rounded(viewpoint.xyz_world)),
         }
 
-    def _route(self, node: Node) -> tuple[list[str], float | None]:
+    def _route(self, node: GraphNode) -> tuple[list[str], float | None]:
         """The asker's route to a node: ids of rooms and connections in turn, and its length in metres.
 
         When the object itself cannot be reached, the route leads to the centre of its room. Empty, None: no route.
@@ -116,7 +116,7 @@ class ReplyBuilder:
         route = find_route(graph, start, node.id) or (find_route(graph, start, room) if room else None)
         return ([], None) if route is None else (list(route.ids), _rounded(route.length_m))
 
-    def _place(self, node: Node) -> str:
+    def _place(self, node: GraphNode) -> str:
         parent = self.executor.graph.nodes[node.parent]
         return f"{parent.name} {parent.id}"
 

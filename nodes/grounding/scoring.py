@@ -14,7 +14,7 @@ from placegraph.nodes.grounding.box_arrays import Boxes
 from placegraph.nodes.grounding.relations import HOLDS, rank_positions
 from placegraph.nodes.grounding.settings import ScoreSettings
 from placegraph.runtime.arrays import F64, Bool
-from placegraph.runtime.scene_graph import Node
+from placegraph.runtime.scene_graph import GraphNode
 
 Sentence = Callable[[int], str]
 
@@ -27,7 +27,7 @@ class ScoredCandidates:
     """
 
     def __init__(
-        self, boxes: Boxes, nodes: Sequence[Node | None], names: F64, settings: ScoreSettings, *, narrowed: bool
+        self, boxes: Boxes, nodes: Sequence[GraphNode | None], names: F64, settings: ScoreSettings, *, narrowed: bool
     ) -> None:
         """`names` (n,) is how well each is named, 0..1; narrowed: the request says more than the noun."""
         self.boxes, self.nodes, self.settings = boxes, nodes, settings

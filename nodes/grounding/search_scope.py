@@ -14,12 +14,12 @@ from placegraph.nodes.grounding.program import Condition, Thing
 from placegraph.nodes.grounding.program_syntax import format_program
 from placegraph.nodes.grounding.word_lists import word_table
 from placegraph.runtime.language.word_forms import normal_form
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 
 # What rooms of a kind typically hold, the most typical first; used when the map has no room of that name.
 TYPICAL_OBJECTS: dict[str, list[str]] = word_table("typical_objects")
 
-RankPlaces = Callable[[Thing, Sequence[NameMatch]], list[Node]]
+RankPlaces = Callable[[Thing, Sequence[NameMatch]], list[GraphNode]]
 
 
 @dataclass
@@ -30,8 +30,8 @@ class SearchScope:
     conditions. hints: conditions that raise scores without having to hold.
     """
 
-    objects: list[Node]
-    places: list[Node]  # floors, rooms and locations that can be asked for themselves
+    objects: list[GraphNode]
+    places: list[GraphNode]  # floors, rooms and locations that can be asked for themselves
     thing: Thing = field(default_factory=Thing)
     notes: list[str] = field(default_factory=list)
     sure: bool = True
@@ -124,17 +124,17 @@ def _names_place(graph: SceneGraph, thing: Thing, names: NameMatcher) -> bool:
     return bool(match_places(thing.noun, places, names)) or bool(_typical_objects(thing.noun, names))
 
 
-def _keep_below(graph: SceneGraph, scope: SearchScope, tops: Sequence[Node], *, outside: bool = False) -> None:
+def _keep_below(graph: SceneGraph, scope: SearchScope, tops: Sequence[GraphNode], *, outside: bool = False) -> None:
     floor_words = {top.id for top in tops}
 
-    def is_kept(node: Node) -> bool:
+    def is_kept(node: GraphNode) -> bool:
         return outside != any(step.id in floor_words for step in graph.path(node.id))
 
     scope.objects = [node for node in scope.objects if is_kept(node)]
     scope.places = [node for node in scope.places if is_kept(node)]
 
 
-def match_places(name: str, places: Sequence[Node], names: NameMatcher) -> list[NameMatch]:
+def match_places(name: str, places: Sequence[GraphNode], names: NameMatcher) -> list[NameMatch]:
     """Rooms and locations with that name: those whose strongest tag it is, else those that have it among their tags."""
     matches = [
         m
@@ -145,7 +145,7 @@ def match_places(name: str, places: Sequence[Node], names: NameMatcher) -> list[
     return strongest or matches
 
 
-def match_floors(graph: SceneGraph, words: str) -> list[Node]:
+def match_floors(graph: SceneGraph, words: str) -> list[GraphNode]:
     """Floors by words: "upstairs" is all but the lowest, "second floor" the second from below; or by tag or id."""
     floors = sorted(graph.layer("floor"), key=lambda floor: (float(floor.box[0, 2]), floor.id))
     floor_words = normal_form(words)

@@ -23,7 +23,7 @@ from placegraph.nodes.hierarchy.traversability import TraversabilityConfig
 from placegraph.runtime.arrays import F32, F64, Points
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Map, MapObject
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import bounding_box, convex_footprint
 
 
@@ -71,7 +71,7 @@ class GraphBuilder:
         floor_ids = self._floor_ids.assign(
             [("", height_outline(span.low, max(span.ceiling, span.low + 0.1))) for span in spans]
         )
-        nodes: list[Node] = []
+        nodes: list[GraphNode] = []
         rooms: list[FloorRoom] = []
         extents: list[_FloorExtent] = []
         plans: list[FloorPlan] = []
@@ -115,7 +115,7 @@ class GraphBuilder:
 
     def _location_and_object_nodes(
         self, rooms: list[FloorRoom], object_rooms: list[FloorRoom], objects: list[Points], items: list[MapObject]
-    ) -> list[Node]:
+    ) -> list[GraphNode]:
         """Locations of all rooms, then all objects; a room's are found again only when its objects changed."""
         digests = [digest(xyz) for xyz in objects]
         in_room: dict[str, list[int]] = {room.id: [] for room in rooms}
@@ -163,7 +163,7 @@ def _in_zone(xyz: Points, span: FloorSpan) -> Points:
     return xyz[(z >= span.zone_low) & (z <= span.zone_high)]
 
 
-def _building_node(floors: list[_FloorExtent]) -> Node:
+def _building_node(floors: list[_FloorExtent]) -> GraphNode:
     if not floors:
         return _node("B0", "", np.zeros((2, 3)), np.zeros((0, 2)))
     boxes = np.stack([floor.box for floor in floors])
@@ -171,12 +171,12 @@ def _building_node(floors: list[_FloorExtent]) -> Node:
     return _node("B0", "", box, convex_footprint(np.concatenate([floor.outline for floor in floors])))
 
 
-def _place_node(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tuple[Tag, ...] = ()) -> Node:
+def _place_node(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tuple[Tag, ...] = ()) -> GraphNode:
     box = np.array([[*outline.min(axis=0), span.low], [*outline.max(axis=0), span.ceiling]])
     return _node(node_id, parent, box, outline, tags=tags)
 
 
-def _object_node(item: MapObject, parent: str, footprint: Points) -> Node:
+def _object_node(item: MapObject, parent: str, footprint: Points) -> GraphNode:
     return _node(
         f"O{item.id}",
         parent,
@@ -191,12 +191,14 @@ def _object_node(item: MapObject, parent: str, footprint: Points) -> Node:
     )
 
 
-def _node(node_id: str, parent: str, box: Points, footprint: Points, **fields: Any) -> Node:
+def _node(node_id: str, parent: str, box: Points, footprint: Points, **fields: Any) -> GraphNode:
     values: dict[str, Any] = {"tags": (), "first_frame": -1, "last_frame": -1} | fields
-    return Node(id=node_id, parent=parent, box=np.asarray(box, float), footprint=np.asarray(footprint, float), **values)
+    return GraphNode(
+        id=node_id, parent=parent, box=np.asarray(box, float), footprint=np.asarray(footprint, float), **values
+    )
 
 
-def _with_frames(nodes: list[Node]) -> list[Node]:
+def _with_frames(nodes: list[GraphNode]) -> list[GraphNode]:
     """Places are seen from the first to the last frame of the objects in them; -1 where there are none."""
     parents = {node.id: node.parent for node in nodes}
     frames: dict[str, list[int]] = {}

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from placegraph.runtime.language.word_forms import normal_form
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class PlaceContents:
     locations: tuple[str, ...] = ()
 
 
-def place_contents(graph: SceneGraph, place: Node) -> PlaceContents:
+def place_contents(graph: SceneGraph, place: GraphNode) -> PlaceContents:
     """The strongest tags of the objects and locations in a place; objects in a room's locations are in the room too."""
     children = graph.children(place.id)
     below = [node for child in children for node in (child, *graph.children(child.id))]

@@ -12,7 +12,7 @@ from placegraph.nodes.recorder.draw_map import named_box
 from placegraph.nodes.recorder.drawing import Canvas, Color, color_of, markdown
 from placegraph.runtime import messages as m
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 
 COLUMN_PX, ROW_PX = 150.0, 26.0  # the drawn tree: layers from left to right, leaves from top to bottom
 LAYER_COLORS: dict[str, Color] = {
@@ -80,11 +80,11 @@ def draw_connections(canvas: Canvas, scene: SceneGraph) -> None:
     canvas.replace("connections", drawn)
 
 
-def _label(node: Node) -> str:
+def _label(node: GraphNode) -> str:
     return f"{node.id} {node.name}" if node.layer != "object" else f"{node.name} {node.id}"
 
 
-def _outline(node: Node) -> rr.LineStrips3D:
+def _outline(node: GraphNode) -> rr.LineStrips3D:
     (x0, y0, z0), (x1, y1, _) = node.box.tolist()
     corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
     outline = node.footprint.tolist() if len(node.footprint) >= 3 else corners
@@ -104,7 +104,7 @@ def _tree_positions(scene: SceneGraph) -> dict[str, tuple[float, float]]:
     positions: dict[str, tuple[float, float]] = {}
     rows = 0.0
 
-    def place(node: Node) -> float:
+    def place(node: GraphNode) -> float:
         nonlocal rows
         children = [place(child) for child in scene.children(node.id)]
         row = float(np.mean((children[0], children[-1]))) if children else rows

@@ -52,7 +52,7 @@ OBJECT_FIELDS = ("observations", "oriented_box", "color", "approach", "front")  
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Node:
+class GraphNode:
     """One building, floor, room, location or object. Box (2, 3) min/max and footprint (K, 2) in metres, world frame."""
 
     id: NodeId
@@ -108,13 +108,16 @@ class Node:
 class SceneGraph:
     """Nodes and connections by id, and route segments. Build it with `SceneGraph.of`, which checks the invariants."""
 
-    nodes: dict[str, Node] = field(default_factory=dict)
+    nodes: dict[str, GraphNode] = field(default_factory=dict)
     connections: dict[str, Connection] = field(default_factory=dict)
     route_segments: tuple[RouteSegment, ...] = ()
 
     @classmethod
     def of(
-        cls, nodes: Iterable[Node], connections: Iterable[Connection] = (), route_segments: Iterable[RouteSegment] = ()
+        cls,
+        nodes: Iterable[GraphNode],
+        connections: Iterable[Connection] = (),
+        route_segments: Iterable[RouteSegment] = (),
     ) -> SceneGraph:
         """Build and check a graph; raises SchemaError naming what breaks an invariant."""
         listed, joined = list(nodes), list(connections)
@@ -129,7 +132,7 @@ class SceneGraph:
         graph.check()
         return graph
 
-    def with_nodes(self, nodes: Iterable[Node]) -> SceneGraph:
+    def with_nodes(self, nodes: Iterable[GraphNode]) -> SceneGraph:
         """The same connections and route segments with other nodes; raises SchemaError."""
         return SceneGraph.of(nodes, self.connections.values(), self.route_segments)
 
@@ -149,7 +152,7 @@ class SceneGraph:
             if node.approach is not None:
                 check_approach(f"scene graph node {node.id}", node.approach, self.room_of(node.id), self.connections)
 
-    def _check_node(self, node: Node) -> None:
+    def _check_node(self, node: GraphNode) -> None:
         where = f"scene graph node {node.id}"
         allowed = PARENT_LAYERS[node.layer]
         if not allowed:
@@ -178,19 +181,19 @@ class SceneGraph:
         return {parent: tuple(ids) for parent, ids in ids_by_parent.items()}
 
     @property
-    def building(self) -> Node:
+    def building(self) -> GraphNode:
         """The root."""
         return next(node for node in self.nodes.values() if node.layer == "building")
 
-    def layer(self, name: str) -> list[Node]:
+    def layer(self, name: str) -> list[GraphNode]:
         """All nodes of a layer, by id number."""
         return [node for node in self.nodes.values() if node.layer == name]
 
-    def children(self, node_id: str) -> list[Node]:
+    def children(self, node_id: str) -> list[GraphNode]:
         """Direct children, by layer and id number."""
         return [self.nodes[i] for i in self._children.get(node_id, ())]
 
-    def descendants(self, node_id: str, layer: str) -> list[Node]:
+    def descendants(self, node_id: str, layer: str) -> list[GraphNode]:
         """All nodes of `layer` below a node, by id number."""
         nodes, parent_ids = [], [node_id]
         for parent_id in parent_ids:  # grows during the loop
@@ -199,7 +202,7 @@ class SceneGraph:
             nodes += [child for child in children if child.layer == layer]
         return sorted(nodes, key=lambda node: id_key(node.id))
 
-    def path(self, node_id: str) -> list[Node]:
+    def path(self, node_id: str) -> list[GraphNode]:
         """From the building down to the node itself."""
         chain = [self.nodes[node_id]]
         while chain[-1].parent:
@@ -262,6 +265,6 @@ class _GraphDocument(BaseModel):
     model_config = ConfigDict(title="SceneGraph")
 
     version: Annotated[int, PlainValidator(_check_version), WithJsonSchema({"const": VERSION})]
-    nodes: list[Node]
+    nodes: list[GraphNode]
     connections: list[Connection]
     ways: list[RouteSegment]

@@ -18,7 +18,7 @@ import numpy as np
 
 from placegraph.runtime.arrays import F64
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.runtime.scene_graph.object_list import (
     ListedFloor,
     ListedRoom,
@@ -87,7 +87,7 @@ def graph_from_object_list(listed: ObjectList, where: str) -> ImportedGraph:
         if (box := room.box) is not None:
             floors[room.floor].boxes.append(box)
     ids: dict[str, SourceId] = {}
-    places: list[Node] = []
+    places: list[GraphNode] = []
     for letter, layer in (("F", floors), ("R", rooms)):
         for i, place in enumerate(layer):
             if (box := place.box) is None:
@@ -117,11 +117,11 @@ def _boxes(centers: Sequence[Sequence[float]], sizes: Sequence[Sequence[float]])
 
 def _node(
     node_id: str, parent: str, tags: tuple[Tag, ...], box: F64, outline: F64 | None = None, **fields: Any
-) -> Node:
+) -> GraphNode:
     (x0, y0, _), (x1, y1, _) = box.tolist()
     footprint = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) if outline is None else outline
     fields |= {"first_frame": -1, "last_frame": -1}
-    return Node(id=node_id, parent=parent, tags=tags, box=box, footprint=footprint, **fields)
+    return GraphNode(id=node_id, parent=parent, tags=tags, box=box, footprint=footprint, **fields)
 
 
 def _places(listed: ObjectList, boxes: F64) -> tuple[list[_PlaceDraft], list[_PlaceDraft], list[int]]:

@@ -20,7 +20,7 @@ from placegraph.nodes.grounding.reasoner import Reasoner
 from placegraph.nodes.naming.place_types import LOCATION_TYPES, ROOM_TYPES
 from placegraph.runtime.errors import QueryError
 from placegraph.runtime.language.language_model import LanguageModel
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.tools.training.request_grammar import examples
 
 ROOT = Path(__file__).parents[2]
@@ -38,7 +38,7 @@ def people():
 
 def by_rules(text):
     box = np.zeros((2, 3))
-    building = Node(id="B0", parent="", tags=(), box=box, footprint=box[:, :2], first_frame=-1, last_frame=-1)
+    building = GraphNode(id="B0", parent="", tags=(), box=box, footprint=box[:, :2], first_frame=-1, last_frame=-1)
     graph = SceneGraph.of([building])
     reasoner = Reasoner(NameMatcher(TextEncoder().encode), None, (*ROOM_TYPES, *LOCATION_TYPES), use_model=False)
     return reasoner.parse(graph, text).target, 1.0

@@ -16,7 +16,7 @@ from placegraph.runtime.errors import ConfigError, SchemaError
 from placegraph.runtime.messages.topics import TOPICS
 from placegraph.runtime.node import Context
 from placegraph.runtime.recording import kinds_in, properties, read
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.runtime.scene_graph.place_graph import Connection, RouteSegment
 
 Play = Callable[..., dict[str, list[dict[str, Any]]]]
@@ -137,14 +137,14 @@ def map_of(names: dict[int, tuple[str, ...]], frame_id: int = 0, points: int = 5
     )
 
 
-def place(node_id: str, parent: str, name: str = "", corners: int = 4) -> Node:
+def place(node_id: str, parent: str, name: str = "", corners: int = 4) -> GraphNode:
     footprint = np.array([[0, 0], [2, 0], [2, 3], [0, 3]], float)[:corners]
     box = np.array([[0, 0, 0.5], [2, 3, 2.5]])
     tags = (Tag(name, 1.0),) if name else ()
-    return Node(id=node_id, parent=parent, tags=tags, box=box, footprint=footprint, first_frame=0, last_frame=1)
+    return GraphNode(id=node_id, parent=parent, tags=tags, box=box, footprint=footprint, first_frame=0, last_frame=1)
 
 
-def graph(*nodes: Node, frame_id: int = 0) -> m.Graph:
+def graph(*nodes: GraphNode, frame_id: int = 0) -> m.Graph:
     text = SceneGraph.of([place("B0", ""), *nodes]).to_json()
     return m.Graph(frame_id=frame_id, stamp_ns=0, revision=1, final=False, json=text)
 

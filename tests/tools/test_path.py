@@ -3,15 +3,15 @@ import json
 import numpy as np
 import pytest
 
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 
 
-def node(node_id: str, parent: str, name: str = "", **more: object) -> Node:
+def node(node_id: str, parent: str, name: str = "", **more: object) -> GraphNode:
     tags = (Tag(name, 1.0),) if name else ()
     box = np.array([[0, 0, 0], [1, 1, 1]], float)
     fields: dict = {"tags": tags, "box": box, "footprint": np.zeros((0, 2)), "first_frame": 0, "last_frame": 1}
-    return Node(id=node_id, parent=parent, **(fields | more))
+    return GraphNode(id=node_id, parent=parent, **(fields | more))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy as np
 
 from placegraph.runtime.arrays import F64, Points
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import bounding_box, transform
 from placegraph.tools.map_files.map_folder import OBJECTS, read_object_clouds
 
@@ -73,7 +73,7 @@ def align_map(graph: SceneGraph, clouds: Mapping[str, Points], true_from_map: F6
     return AlignedMap(heights, places("room"), places("location"), tuple(objects))
 
 
-def _place(graph: SceneGraph, floor_index: dict[str, int], node: Node, true_from_map: F64) -> MapPlace:
+def _place(graph: SceneGraph, floor_index: dict[str, int], node: GraphNode, true_from_map: F64) -> MapPlace:
     floor_id = next(ancestor.id for ancestor in graph.path(node.id) if ancestor.layer == "floor")
     outline = node.footprint @ true_from_map[:2, :2].T + true_from_map[:2, 3]
     return MapPlace(node.id, floor_index[floor_id], np.asarray(outline))

@@ -26,7 +26,7 @@ from placegraph.runtime.language.language_model import LanguageModel
 from placegraph.runtime.messages import Question
 from placegraph.runtime.query.reply import Reply, error_reply
 from placegraph.runtime.query.request import make_question
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.tools.evaluate.aligned_map import align_folder
 from placegraph.tools.evaluate.grounding_scores import QuestionResult, eye_in_map, read_questions
 from placegraph.tools.evaluate.trajectory_error import level_alignment, paired, positions_of
@@ -194,7 +194,7 @@ def without_places(program: Program) -> Program:
 def without_hierarchy(graph: SceneGraph) -> SceneGraph:
     """All objects of a graph in one room, without names of places, connections and ways."""
 
-    def place(node_id: str, parent: str) -> Node:
+    def place(node_id: str, parent: str) -> GraphNode:
         return replace(graph.building, id=node_id, parent=parent, tags=())
 
     objects = [replace(node, parent="R0", approach=None) for node in graph.layer("object")]

@@ -12,7 +12,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.runtime.scene_graph.route import find_route
 
 LAYERS = {"object": 2, "location": 3, "room": 4, "floor": 5, "building": 6}
@@ -68,7 +68,7 @@ def _edge() -> dict[str, Any]:
     return {"type": "EdgeAttributes", "weight": 1.0, "weighted": False, "metadata": {}}
 
 
-def _attributes(node: Node, labels: dict[str, int]) -> dict[str, Any]:
+def _attributes(node: GraphNode, labels: dict[str, int]) -> dict[str, Any]:
     red, green, blue = node.color or (128, 128, 128)
     attributes: dict[str, Any] = {
         "type": "SemanticNodeAttributes",
@@ -102,7 +102,7 @@ def _attributes(node: Node, labels: dict[str, int]) -> dict[str, Any]:
     return attributes
 
 
-def _box(node: Node) -> dict[str, Any]:
+def _box(node: GraphNode) -> dict[str, Any]:
     return {
         "type": "RAABB" if node.oriented_box else "AABB",
         "world_P_center": _numbers(node.turned_box[:3]),

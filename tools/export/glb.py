@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from placegraph.runtime.errors import ConfigError
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.tools.map_files.map_folder import read_cloud
 
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # glTF's up is +y, ours +z
@@ -26,7 +26,7 @@ def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
     scene = trimesh.Scene()
     scene.add_geometry(trimesh.PointCloud(xyz, colors=rgb), node_name="cloud", geom_name="cloud")
 
-    def add(node: Node, mesh: Any, color: tuple[int, ...]) -> None:
+    def add(node: GraphNode, mesh: Any, color: tuple[int, ...]) -> None:
         mesh.visual.face_colors = [*color, ALPHA]
         name = f"{node.id} {node.name}"
         scene.add_geometry(mesh, node_name=name, geom_name=name)
@@ -43,7 +43,7 @@ def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
     return [out]
 
 
-def _fence(place: Node, height: float) -> tuple[np.ndarray, np.ndarray]:
+def _fence(place: GraphNode, height: float) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (2 K, 3) and triangles (4 K, 3) of a strip along a place's outline, seen from both sides."""
     count = len(place.footprint)
     feet = np.column_stack((place.footprint, np.full(count, place.box[0, 2])))
@@ -54,7 +54,7 @@ def _fence(place: Node, height: float) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate((feet, feet + np.array([0, 0, height]))), np.concatenate((faces, faces[:, ::-1]))
 
 
-def _placed(thing: Node) -> tuple[np.ndarray, np.ndarray]:
+def _placed(thing: GraphNode) -> tuple[np.ndarray, np.ndarray]:
     """Size (3,) and pose (4, 4) of an object's box, turned about z."""
     centre, size, yaw = thing.turned_box[:3], thing.turned_box[3:6], thing.turned_box[6]
     pose = np.eye(4)

@@ -14,7 +14,7 @@ import numpy as np
 from placegraph.nodes.hierarchy.plan_grid import floor_grid
 from placegraph.runtime.arrays import F32, U8, Bool
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.tools.map_files.map_folder import RGB, make_empty_folder, read_cloud, read_object_clouds
 from placegraph.tools.map_files.ply import write_points
 
@@ -55,7 +55,7 @@ def _place_clouds(graph: SceneGraph, xyz: F32, rgb: U8) -> dict[str, Cloud]:
     return clouds
 
 
-def _inside(points: F32, room: Node) -> Bool:
+def _inside(points: F32, room: GraphNode) -> Bool:
     grid = floor_grid(np.concatenate((points[:, :2], room.footprint)), CELL_M)
     mask = np.zeros(grid.shape, np.uint8)
     corners = np.round((room.footprint - grid.origin) / CELL_M - 0.5).astype(np.int32)

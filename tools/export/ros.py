@@ -13,7 +13,7 @@ import numpy as np
 from placegraph.nodes.hierarchy.plan_grid import PlanGrid, floor_grid
 from placegraph.runtime.arrays import F32, U8
 from placegraph.runtime.errors import ConfigError
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.tools.map_files.map_folder import make_empty_folder, read_cloud
 
 CELL_M = 0.05
@@ -41,7 +41,7 @@ def write(folder: Path, graph: SceneGraph, out: Path) -> list[Path]:
     return written
 
 
-def occupancy(xyz: F32, floor: Node, rooms: list[Node]) -> tuple[PlanGrid, U8]:
+def occupancy(xyz: F32, floor: GraphNode, rooms: list[GraphNode]) -> tuple[PlanGrid, U8]:
     """Grid and image (rows along +y) of one floor from the cloud (P, 3), metres, world frame."""
     above = xyz[:, 2] - floor.box[0, 2]
     solid = xyz[(above > MIN_HEIGHT_M) & (above < MAX_HEIGHT_M) & (xyz[:, 2] < floor.box[1, 2])]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Connection
 
 MARGIN_M = 0.6
@@ -51,12 +51,12 @@ def drawing(graph: SceneGraph) -> str:
     return "\n".join([head, f"<style>{STYLE}</style>", *parts, "</svg>", ""])
 
 
-def _extent(graph: SceneGraph, floor: Node) -> tuple[np.ndarray, np.ndarray]:
+def _extent(graph: SceneGraph, floor: GraphNode) -> tuple[np.ndarray, np.ndarray]:
     boxes = np.array([node.box[:, :2] for node in [floor, *graph.descendants(floor.id, "room")]])
     return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
 
-def _shapes(graph: SceneGraph, floor: Node) -> Iterator[str]:
+def _shapes(graph: SceneGraph, floor: GraphNode) -> Iterator[str]:
     for k, room in enumerate(graph.descendants(floor.id, "room")):
         yield _polygon("room", room, f' fill="{TINTS[k % len(TINTS)]}"')
     for location in graph.descendants(floor.id, "location"):
@@ -71,7 +71,7 @@ def _shapes(graph: SceneGraph, floor: Node) -> Iterator[str]:
                     break
 
 
-def _labels(graph: SceneGraph, floor: Node, x: float, y: float) -> Iterator[str]:
+def _labels(graph: SceneGraph, floor: GraphNode, x: float, y: float) -> Iterator[str]:
     for thing in graph.descendants(floor.id, "object"):
         yield _text("name", x + thing.center[0], y - thing.center[1], thing.name)
     for room in graph.descendants(floor.id, "room"):
@@ -88,7 +88,7 @@ def _passage(connection: Connection, end: np.ndarray) -> str:
     return f'<line class="stairs" x1="{x0:.3f}" y1="{y0:.3f}" x2="{x1:.3f}" y2="{y1:.3f}">{title}</line>'
 
 
-def _polygon(kind: str, node: Node, more: str = "") -> str:
+def _polygon(kind: str, node: GraphNode, more: str = "") -> str:
     points = " ".join(f"{x:.3f},{y:.3f}" for x, y in node.footprint.tolist())
     title = f"<title>{escape(f'{node.id} {node.name}')}</title>"
     return f'<polygon class="{kind}" points="{points}"{more}>{title}</polygon>'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from placegraph.runtime.arrays import F64
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.tools.simulator.color_palette import COLORS, WOODS
 from placegraph.tools.simulator.house_model import NOWHERE, House, PlacedItem
 
@@ -30,20 +30,22 @@ def ground_truth_graph(house: House) -> SceneGraph:
     return SceneGraph.of([_node("B0", "", "building", box, house.floors[0].outline), *nodes])
 
 
-def _place(letter: str, number: int, parent: str, name: str, outline: F64, z_m: float, height_m: float) -> Node:
+def _place(letter: str, number: int, parent: str, name: str, outline: F64, z_m: float, height_m: float) -> GraphNode:
     low, high = outline.min(axis=0), outline.max(axis=0)
     box = np.array([[*low, z_m], [*high, z_m + height_m]])
     return _node(f"{letter}{number}", parent, name, box, outline)
 
 
-def _node(id: str, parent: str, name: str, box: F64, outline: F64) -> Node:
-    return Node(id=id, parent=parent, tags=(Tag(name, 1.0),), box=box, footprint=outline, first_frame=-1, last_frame=-1)
+def _node(id: str, parent: str, name: str, box: F64, outline: F64) -> GraphNode:
+    return GraphNode(
+        id=id, parent=parent, tags=(Tag(name, 1.0),), box=box, footprint=outline, first_frame=-1, last_frame=-1
+    )
 
 
-def _object(placed: PlacedItem) -> Node:
+def _object(placed: PlacedItem) -> GraphNode:
     item = placed.item
     center, size, yaw = placed.oriented_box
-    return Node(
+    return GraphNode(
         id=f"O{placed.id}",
         parent=f"R{placed.room}" if placed.location == NOWHERE else f"L{placed.location}",
         tags=(Tag(item.name, 1.0),),

@@ -11,14 +11,14 @@ import pytest
 from placegraph.models_onnx.text_encoder import TextEncoder
 from placegraph.nodes.grounding.name_matching import NameMatcher
 from placegraph.runtime.messages import NamedGraph, Question
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 
 
 def make_node(node_id, parent, name, low, high, color=(), others=()):
     tags = tuple(Tag(text, weight) for text, weight in (((name, 5.0),) if name else ()) + tuple(others))
     box = np.array([low, high], float)
     outline = box[[0, 1, 1, 0], 0], box[[0, 0, 1, 1], 1]
-    return Node(
+    return GraphNode(
         id=node_id, parent=parent, tags=tags, box=box, footprint=np.stack(outline, axis=1),
         first_frame=-1, last_frame=-1, color=tuple(color),
     )  # fmt: skip

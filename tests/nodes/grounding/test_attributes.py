@@ -6,7 +6,7 @@ import pytest
 from placegraph.nodes.grounding.attributes import BASIC_COLORS, appearance_fits, color_fit, size_fit
 from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.nodes.grounding.settings import AppearanceSettings
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 
 SETTINGS = AppearanceSettings()
 
@@ -28,7 +28,7 @@ def test_a_tag_that_says_the_colour_wins(thing_of):
 
 
 def boxes_of(nodes):
-    building = Node(
+    building = GraphNode(
         id="B0", parent="", tags=(), box=np.array([[0, 0, 0], [9, 9, 9.0]]), footprint=np.zeros((0, 2)),
         first_frame=-1, last_frame=-1,
     )  # fmt: skip

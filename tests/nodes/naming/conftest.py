@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.messages import Graph
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 
 CONTENTS = {
     "L0": ["table", "chair", "chair", "chair", "chair", "cup", "cup"],
@@ -18,7 +18,7 @@ PARENTS = {"B0": "", "F0": "B0", "R0": "F0", "R1": "F0", "R2": "F0", "L0": "R0"}
 def make_node(node_id, parent, name=""):
     tags = (Tag(name, 1.0),) if name else ()
     box = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    return Node(id=node_id, parent=parent, tags=tags, box=box, footprint=box[:, :2], first_frame=-1, last_frame=-1)
+    return GraphNode(id=node_id, parent=parent, tags=tags, box=box, footprint=box[:, :2], first_frame=-1, last_frame=-1)
 
 
 def make_graph(parents, contents):

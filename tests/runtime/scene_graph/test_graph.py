@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 
 
-def node(node_id: str, parent: str, **changes: object) -> Node:
+def node(node_id: str, parent: str, **changes: object) -> GraphNode:
     fields: dict = {
         "tags": (),
         "box": np.array([[0, 0, 0], [1, 1, 1]], float),
@@ -16,10 +16,10 @@ def node(node_id: str, parent: str, **changes: object) -> Node:
         "first_frame": 0,
         "last_frame": 1,
     }
-    return Node(id=node_id, parent=parent, **(fields | changes))
+    return GraphNode(id=node_id, parent=parent, **(fields | changes))
 
 
-def house() -> list[Node]:
+def house() -> list[GraphNode]:
     chain = [node("B0", ""), node("F0", "B0"), node("R0", "F0"), node("R10", "F0"), node("R2", "F0")]
     return [*chain, node("L0", "R2"), node("O5", "L0", tags=(Tag("cup", 1.23456),)), node("O3", "R0")]
 
@@ -55,7 +55,7 @@ def test_walks() -> None:
         ([node("B0", "", footprint=np.zeros((2, 3)))], "B0: footprint must be"),
     ],
 )
-def test_broken_invariants_are_named(nodes: list[Node], problem: str) -> None:
+def test_broken_invariants_are_named(nodes: list[GraphNode], problem: str) -> None:
     with pytest.raises(SchemaError, match=problem):
         SceneGraph.of(nodes)
 

@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 
 from placegraph.runtime.errors import SchemaError
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 
 
-def node(node_id: str, parent: str, **more: object) -> Node:
+def node(node_id: str, parent: str, **more: object) -> GraphNode:
     fields: dict = {"tags": (), "box": np.array([[0, 0, 0], [1, 1, 1]], float), "footprint": np.zeros((0, 2))}
-    return Node(id=node_id, parent=parent, first_frame=0, last_frame=1, **(fields | more))
+    return GraphNode(id=node_id, parent=parent, first_frame=0, last_frame=1, **(fields | more))
 
 
-def nodes(approach: Approach | None = None) -> list[Node]:
+def nodes(approach: Approach | None = None) -> list[GraphNode]:
     rooms = [node(f"R{i}", "F0") for i in (0, 1, 2)]
     return [node("B0", ""), node("F0", "B0"), *rooms, node("O1", "R1", approach=approach)]
 

@@ -1,20 +1,20 @@
 import numpy as np
 import pytest
 
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Approach, Connection, RouteSegment
 from placegraph.runtime.scene_graph.route import find_route, room_at
 
-BUILDING = Node(
+BUILDING = GraphNode(
     id="B0", parent="", tags=(), box=np.zeros((2, 3)), footprint=np.zeros((0, 2)), first_frame=0, last_frame=0
 )
 
 
-def square(node_id: str, parent: str, x: float, z: float = 0.0, **more: object) -> Node:
+def square(node_id: str, parent: str, x: float, z: float = 0.0, **more: object) -> GraphNode:
     outline = np.array([[x, 0], [x + 4, 0], [x + 4, 4], [x, 4]], float)
     box = np.array([[x, 0, z], [x + 4, 4, z + 2.6]])
     fields: dict = {"tags": (), "box": box, "footprint": outline}
-    return Node(id=node_id, parent=parent, first_frame=0, last_frame=1, **(fields | more))
+    return GraphNode(id=node_id, parent=parent, first_frame=0, last_frame=1, **(fields | more))
 
 
 def passage(connection_id: str, kind: str, rooms: tuple[str, str], low: tuple, high: tuple, length: float = 0.0):

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Connection, RouteSegment
 from placegraph.tools.evaluate.connection_scores import connection_scores, match_connections, travel_lengths
 from placegraph.tools.simulator.ground_truth import HouseRun, TrueConnection, Truth
@@ -14,7 +14,9 @@ MOVED[:3, 3] = (1, 2, 0.5)
 
 def node(node_id, parent):
     box = np.array([[0, 0, 0], [1, 1, 1]], float)
-    return Node(id=node_id, parent=parent, tags=(), box=box, footprint=np.zeros((0, 2)), first_frame=0, last_frame=0)
+    return GraphNode(
+        id=node_id, parent=parent, tags=(), box=box, footprint=np.zeros((0, 2)), first_frame=0, last_frame=0
+    )
 
 
 def door(i, x, rooms=("R0", "R1"), kind="door", width=0.8):

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from placegraph.nodes.camera.tum import SOURCE as TUM
 from placegraph.runtime.errors import SchemaError
 from placegraph.runtime.messages import Pose
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.runtime.vision.geometry import inverse, transform
 from placegraph.tools.evaluate.aligned_map import align_folder
 from placegraph.tools.evaluate.house_truth import HOUSE_VOCABULARY, MIN_FRAMES, house_ground_truth, visibility_of
@@ -48,7 +48,7 @@ def into_map(outline):
 
 
 def node(id, parent, box, outline, tags=()):
-    return Node(id=id, parent=parent, tags=tags, box=box, footprint=outline, first_frame=-1, last_frame=-1)
+    return GraphNode(id=id, parent=parent, tags=tags, box=box, footprint=outline, first_frame=-1, last_frame=-1)
 
 
 def extent(points):

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.runtime.vision import area_overlap
 from placegraph.tools.evaluate.aligned_map import EMPTY_MAP, AlignedMap, MapPlace
 from placegraph.tools.evaluate.place_name_scores import name_scores, place_name_scores
@@ -51,7 +51,7 @@ def test_a_map_like_the_house_has_all_names(house):
     def node(id, parent, name, outline, floor):
         box = np.array([[*outline.min(axis=0), floor.z_m], [*outline.max(axis=0), floor.z_m + 1]])
         tags = (Tag(name, 1.0),) if name else ()
-        return Node(id=id, parent=parent, tags=tags, box=box, footprint=outline, first_frame=0, last_frame=0)
+        return GraphNode(id=id, parent=parent, tags=tags, box=box, footprint=outline, first_frame=0, last_frame=0)
 
     floors, rooms = house.floors, house.rooms
     everything = np.concatenate([floor.outline for floor in floors])

@@ -5,7 +5,7 @@ from placegraph.nodes.camera.tum import SOURCE as TUM
 from placegraph.runtime.errors import SchemaError, SourceError
 from placegraph.runtime.messages import Graph, Map, Segments
 from placegraph.runtime.recording import RecordingWriter
-from placegraph.runtime.scene_graph import Node, SceneGraph, Tag
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph, Tag
 from placegraph.tools.evaluate.house_truth import visibility_of
 from placegraph.tools.evaluate.walk_quarters import recorded_snapshots, walk_quarter_scores
 from placegraph.tools.simulator.ground_truth import read_truth
@@ -58,7 +58,7 @@ def snapshot(source, given, revision, frames, shift, cameras=None):
     slab = np.stack((low, high))
 
     def node(id, parent, box, outline, tags=()):
-        return Node(id=id, parent=parent, tags=tags, box=box, footprint=outline, first_frame=-1, last_frame=-1)
+        return GraphNode(id=id, parent=parent, tags=tags, box=box, footprint=outline, first_frame=-1, last_frame=-1)
 
     nodes = [node("B0", "", slab, slab[:, :2]), node("F0", "B0", slab, slab[:, :2])]
     nodes += [node(f"R{room.id}", "F0", slab, room.polygon + shift[:2]) for room in truth.rooms]

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 from placegraph.runtime.scene_graph.place_graph import Connection
 from placegraph.tools.export import dsg, svg
 from placegraph.tools.map_files.map_folder import read_cloud, read_object_clouds
@@ -66,7 +66,7 @@ def test_the_plan_draws_every_place_and_object_where_it_is(cli, mapped, graph, t
 def test_the_plan_marks_doors_on_their_floor_and_stairs_on_both():
     def node(id, parent, z=0.0):
         box = np.array([[0, 0, z], [4, 4, z + 2.6]])
-        return Node(id=id, parent=parent, tags=(), box=box, footprint=box[:, :2], first_frame=0, last_frame=0)
+        return GraphNode(id=id, parent=parent, tags=(), box=box, footprint=box[:, :2], first_frame=0, last_frame=0)
 
     nodes = [
         node("B0", ""),

@@ -7,7 +7,7 @@ from placegraph.nodes.grounding.box_arrays import layout_of
 from placegraph.nodes.grounding.program import CONDITIONS
 from placegraph.nodes.grounding.relations import HOLDS, RelationQuery, relations_by_name, trigger_phrases
 from placegraph.nodes.grounding.viewpoint import ViewpointSelector
-from placegraph.runtime.scene_graph import Node, SceneGraph
+from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 
 SOUTH = np.array([0.0, -5.0, 1.5])  # looking north: left is -x
 NOBODY = np.full(3, np.nan)
@@ -16,7 +16,7 @@ ROOM = [[-5.0, -8, -1], [5, 3, 5]]
 
 def places_of(room):
     return [
-        Node(
+        GraphNode(
             id=i,
             parent=p,
             tags=(),
@@ -160,7 +160,7 @@ def test_ranks(cube, relation, first):
 def test_closest_is_by_surfaces_and_a_wall_between_makes_far(cube, thing_of):
     long, small = cube(0, (3, 0, 0), (5, 0.4, 0.4)), cube(1, (0, 1.2, 0))
     assert evaluate("closest", [long, small], [cube(9, (0, 0, 0))]).values.argmax() == 0
-    room = Node(
+    room = GraphNode(
         id="R1", parent="F0", tags=(), box=np.array([[0, 0, 3], [4, 4, 6.0]]), footprint=np.zeros((0, 2)),
         first_frame=-1, last_frame=-1,
     )  # fmt: skip
