@@ -65,9 +65,12 @@ def test_the_language_model_is_asked_in_both_ways(reference: ReferenceRecording)
     assert {key.split('"')[1] for key in reference.replies} == {"complete", "log_probabilities"}
 
 
-def test_it_holds_two_floors_keyframes_that_a_loop_moved_and_a_retired_object(reference: ReferenceRecording) -> None:
+def test_it_holds_two_floors_with_stairs_keyframes_that_a_loop_moved_and_a_retired_object(
+    reference: ReferenceRecording,
+) -> None:
     graphs = [message for message in reference.messages if isinstance(message, Graph)]
-    assert len(SceneGraph.from_json(graphs[-1].json).layer("floor")) == 2
+    graph = SceneGraph.from_json(graphs[-1].json)
+    assert len(graph.layer("floor")) == 2 and [c.kind for c in graph.connections.values()] == ["stairs"]
     moved = [
         message for message in reference.messages if isinstance(message, Correction) and len(message.moved_frame_ids)
     ]

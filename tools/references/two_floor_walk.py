@@ -1,7 +1,8 @@
 """A hand-made walk through two rooms above each other, with drifting poses and an object that is taken away.
 
 The camera turns once in a kitchen and begins a second turn, which repeats the first views so that a loop can close,
-and shows that the vase is gone; then it turns once in the bedroom above. All surfaces have a pattern with keypoints.
+and shows that the vase is gone; then it climbs to the bedroom above and turns once there. All surfaces have a pattern
+with keypoints.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ BEDROOM: Furniture = {
     "lamp": ((1.5, 2.6, 0.0), (1.8, 2.9, 1.5)),
 }
 TAKEN_AWAY = "vase"  # before the second turn
+CLIMB_M = (0.4, 0.8, 1.15, 1.35, 1.55, 2.0, 2.4)  # heights over the kitchen's floor while climbing; no stairs are drawn
 
 
 def messages() -> Iterator[Message]:
@@ -48,6 +50,8 @@ def messages() -> Iterator[Message]:
     emptier = [box for box in kitchen if box.name != TAKEN_AWAY]
     turns = ((kitchen, TURN_DEG, 0.0), (emptier, SECOND_TURN_DEG, 0.0), (bedroom, TURN_DEG, UPPER_FLOOR_M))
     views = [(boxes, np.radians(heading), floor_m) for boxes, turn, floor_m in turns for heading in turn]
+    at_stairs = len(TURN_DEG) + len(SECOND_TURN_DEG)
+    views[at_stairs:at_stairs] = [([*emptier, *bedroom], 0.0, height_m) for height_m in CLIMB_M]
     for frame_id, (boxes, heading, floor_m) in enumerate(views):
         eye = np.array([ROOM_M[0] / 2, ROOM_M[1] / 2, floor_m + EYE_M])
         eye[:2] += RADIUS_M * np.array([np.cos(heading), np.sin(heading)])

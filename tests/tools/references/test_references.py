@@ -29,6 +29,7 @@ def small(tmp_path_factory) -> Path:
         patch.setitem(making.TWO_FLOORS, "naming", {"method": "none"})
         patch.setattr(two_floor_walk, "TURN_DEG", (0, 24, 48))
         patch.setattr(two_floor_walk, "SECOND_TURN_DEG", (0,))
+        patch.setattr(two_floor_walk, "CLIMB_M", ())
         patch.setattr(making, "QUESTIONS", ("the table", ""))
         result = CliRunner().invoke(APP, ["--update", "--folder", str(folder)])
         assert result.exit_code == 0, result.output
