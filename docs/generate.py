@@ -40,6 +40,7 @@ HEADLINES = (  # in README: what, the experiment's id, its value's name
 )
 CODE_WIDTH = 88  # of commands: what the site shows without scrolling
 WIDTH = 118  # of generated prose; rows of tables may be longer
+SHELL_WORD = re.compile(r"""(?:[^\s"']|"[^"]*"|'[^']*')+""")
 GOAL = re.compile(r"(<=|>=) (-?[0-9.]+)")
 VALUE_NAMES = {Path: "PATH", int: "N", float: "NUMBER"}
 MADE = "<!-- Made by docs/generate.py: do not edit. -->"
@@ -179,9 +180,20 @@ def _experiment(experiment: _Provenance, table: list[str]) -> list[str]:
 
 
 def _continued(command: str) -> list[str]:
-    """One shell command, with backslashes where it would be too long."""
-    lines = textwrap.wrap(command, CODE_WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
-    return [f"{line} \\" for line in lines[:-1]] + lines[-1:]
+    """One shell command over lines that fit, split by backslashes between its words; a comment stands above it.
+
+    Quoted words and comments stay whole, so that what is copied from the page runs.
+    """
+    if len(command) <= CODE_WIDTH:
+        return [command]
+    code, mark, comment = command.partition("  # ")
+    lines: list[str] = []
+    for word in SHELL_WORD.findall(code):
+        if lines and len(lines[-1]) + len(word) < CODE_WIDTH - len(" \\"):
+            lines[-1] += f" {word}"
+        else:
+            lines.append(f"    {word}" if lines else word)
+    return [f"# {comment}"] * bool(mark) + [f"{line} \\" for line in lines[:-1]] + lines[-1:]
 
 
 def commands_page() -> str:
@@ -227,7 +239,9 @@ def _command(name: str, command: Any, level: int) -> list[str]:
 
 
 def _argument(parameter: Any) -> str:
-    return str(parameter.metavar or parameter.name.upper()).strip("[]")
+    """The argument as usage lines write it: in brackets when it may be left out, with dots when it repeats."""
+    name = str(parameter.metavar or parameter.name.upper()).replace("...", "").strip("[]")
+    return (name if parameter.required else f"[{name}]") + "..." * (parameter.nargs == -1)
 
 
 def _spelled(parameter: Any) -> str:
