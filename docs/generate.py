@@ -1,10 +1,12 @@
-"""Write what is made from code or data: pages of docs/, README's headline numbers, the changelog's renamed settings.
+"""Write what is made from code or data: pages of docs/, and tables of README.md, CHANGELOG.md and docs/method.md.
 
     python docs/generate.py          write them
     python docs/generate.py --check  exit status 1 if one differs from what would be written
 
 results.md comes from results/*.json, commands.md from the command line's own help, dataflow.md from the node classes
-and the table of topics. `make docs` writes them before it builds the site; tests/test_docs.py compares them.
+and the table of topics. README's headline numbers come from the results, the changelog's renamed settings from the
+code, and the method's table of the paper's steps from README. `make docs` writes all before it builds the site;
+tests/test_docs.py compares them. The pages are plain Markdown, so that they can be read on GitHub, too.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from placegraph.tools.graph import dataflow_table, topic_table
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "results"
-README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
+README, CHANGELOG, METHOD = ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "docs/method.md"
 HEADLINES = (  # in README: what, the experiment's id, its value's name
     ("Five generated houses: trajectory, ATE rmse", "five_trajectory", "ATE rmse"),
     ("Five houses: rooms, F1 at IoU .5", "five_floors_rooms", "rooms F1 at IoU .5"),
@@ -33,7 +35,7 @@ HEADLINES = (  # in README: what, the experiment's id, its value's name
     ("Five houses: objects at IoU .25, recall", "five_objects", "recall"),
     ("Five houses: questions about the maps, Acc@.25", "five_questions", "Acc@.25"),
     ("Questions about true graphs, exact object", "true_graphs", "exact object"),
-    ("Sentences of people read exactly (Nr3D)", "people", "exact program"),
+    ("Human-written sentences parsed exactly (Nr3D)", "people", "exact program"),
     ("7-Scenes kitchen: trajectory, ATE rmse", "kitchen_trajectory", "ATE rmse"),
     ("7-Scenes kitchen: end to end on two CPU cores", "kitchen_speed", "end to end, 10 processes"),
     ("One question, median", "latency", "median"),
@@ -172,7 +174,8 @@ def results_page() -> str:
 def _experiment(experiment: _Provenance, table: list[str]) -> list[str]:
     commit = "Measured at" if experiment.commit_is == "measured" else "Recorded by"
     source = f"{commit} commit `{experiment.commit}`, {experiment.date}, machine `{experiment.machine}`."
-    lines = [f"### {experiment.title} {{#{experiment.id}}}", "", *table, ""]
+    anchor = f'<a id="{experiment.id}"></a>'  # understood by GitHub and by the site
+    lines = [anchor, "", f"### {experiment.title}", "", *table, ""]
     if experiment.command:
         lines += ["```sh", *(part for line in experiment.command for part in _continued(line)), "```", ""]
     notes = [experiment.measured_by] * bool(experiment.measured_by) + experiment.notes
@@ -221,7 +224,7 @@ def commands_page() -> str:
 def _command(name: str, command: Any, level: int) -> list[str]:
     """The section of a command, and of its subcommands."""
     anchor = name.replace(" ", "-")
-    lines = [f"{'#' * level} {name} {{#{anchor}}}", ""]
+    lines = [f"{'#' * level} {name}", ""]  # the anchor is what GitHub and the site make of this heading
     for paragraph in (command.help or "").split("\n\n"):
         lines += [*_wrapped(_escaped(" ".join(paragraph.split()))), ""]
     subcommands = getattr(command, "commands", None)
@@ -325,11 +328,20 @@ def _setting(path: str) -> str:
     return f"`[nodes.{'.'.join(filter(None, (node, tables)))}] {key}`"
 
 
+def method_page() -> str:
+    """docs/method.md with README's table of the paper's steps."""
+    _, _, rest = README.read_text().partition("<!-- paper table: docs/generate.py copies it into docs/method.md -->\n")
+    header, _, *rows = rest.partition("\n<!-- end of paper table -->")[0].splitlines()
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in (header, *rows)]
+    return _with_table(METHOD, "paper table", cells[0], cells[1:])
+
+
 def _with_table(path: Path, name: str, columns: list[str], rows: list[list[str]]) -> str:
     """The text of a file with the table between its two marks of that name replaced."""
     start, end = f"<!-- {name}: made by docs/generate.py -->", f"<!-- end of {name} -->"
-    before, _, rest = path.read_text().partition(start)
-    return "\n".join([before + start, *_table(columns, rows), end]) + rest.partition(end)[2]
+    before, mark, rest = path.read_text().partition(start)
+    assert mark, f"{path} has no line {start}"
+    return "\n".join([before + start, "", *_table(columns, rows), "", end]) + rest.partition(end)[2]
 
 
 PAGES = {
@@ -338,6 +350,7 @@ PAGES = {
     ROOT / "docs/dataflow.md": dataflow_page,
     README: readme_page,
     CHANGELOG: changelog_page,
+    METHOD: method_page,
 }
 
 
