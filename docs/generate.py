@@ -341,7 +341,7 @@ def _with_table(path: Path, name: str, columns: list[str], rows: list[list[str]]
     start, end = f"<!-- {name}: made by docs/generate.py -->", f"<!-- end of {name} -->"
     before, mark, rest = path.read_text().partition(start)
     assert mark, f"{path} has no line {start}"
-    return "\n".join([before + start, "", *_table(columns, rows), "", end]) + rest.partition(end)[2]
+    return "\n".join([before + start, *_table(columns, rows), end]) + rest.partition(end)[2]
 
 
 PAGES = {
