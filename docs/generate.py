@@ -244,7 +244,8 @@ def _command(name: str, command: Any, level: int) -> list[str]:
 def _argument(parameter: Any) -> str:
     """The argument as usage lines write it: in brackets when it may be left out, with dots when it repeats."""
     name = str(parameter.metavar or parameter.name.upper()).replace("...", "").strip("[]")
-    return (name if parameter.required else f"[{name}]") + "..." * (parameter.nargs == -1)
+    shown = name if parameter.required else f"[{name}]"
+    return f"{shown}..." if parameter.nargs == -1 else shown
 
 
 def _spelled(parameter: Any) -> str:
