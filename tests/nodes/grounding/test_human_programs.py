@@ -1,4 +1,4 @@
-"""The hand-made programs of human-written requests can be written by the model: valid, and of each request's own words."""
+"""The hand-made programs of human-written requests can be written by the model: valid, of each request's own words."""
 
 import json
 from itertools import chain
