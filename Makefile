@@ -1,5 +1,4 @@
-# make demo: set everything up and map a house.  make test: the tests.  make check: lint, format, types, docs.
-# make docs: the documentation as a site in build/site.
+# make, or make help: what can be made. A text behind two number signs is what it prints.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -15,9 +14,12 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt
 QUESTIONS = "where is the sofa" "the monitor upstairs" "which chair is closest to the stove" \
     "the lamp on the nightstand" "find the swimming pool"
 
-.PHONY: demo test check docs clean
+.PHONY: help demo test check docs clean
 
-demo: $(VENV)/.installed
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+demo: $(VENV)/.installed  ## set everything up in .venv, map a generated two-floor house, ask five questions
 	$(BIN)/placegraph house --seed 9002 --floors 2 --out $(HOUSE) --replace
 	rm -rf $(OUT)
 	$(BIN)/placegraph run configs/demo.toml --source $(HOUSE) --out $(OUT) --endpoint tcp/127.0.0.1:7461
@@ -28,13 +30,13 @@ demo: $(VENV)/.installed
 	@echo; echo "the plan:    $(HOUSE)/plan.png"; echo "the map:     $(OUT)"; \
 	    echo "look at it:  $(BIN)/placegraph view $(OUT)"
 
-test: $(VENV)/.installed-dev
+test: $(VENV)/.installed-dev  ## set up what tests need and run them all
 	$(BIN)/python -m pytest -q
 
-check: $(VENV)/.installed-dev
+check: $(VENV)/.installed-dev  ## lint, format, types, documentation
 	PYTHON=$(BIN)/python tools/check.sh
 
-docs: $(VENV)/.installed-dev
+docs: $(VENV)/.installed-dev  ## the documentation as a site: build/site/index.html
 	$(BIN)/python docs/generate.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 	@echo "the site: build/site/index.html"
@@ -49,5 +51,5 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(PIP_INSTALL) --no-deps spark-dsg  # a test reads our export with it; its plotting packages are not needed
 	touch $@
 
-clean:
+clean:  ## remove .venv, build and out
 	rm -rf $(VENV) build out

@@ -1,10 +1,12 @@
-"""Write what is made from code or data: pages of docs/, README's headline numbers, the changelog's renamed settings.
+"""Write what is made from code or data: pages of docs/, and tables of README.md, CHANGELOG.md and docs/method.md.
 
     python docs/generate.py          write them
     python docs/generate.py --check  exit status 1 if one differs from what would be written
 
 results.md comes from results/*.json, commands.md from the command line's own help, dataflow.md from the node classes
-and the table of topics. `make docs` writes them before it builds the site; tests/test_docs.py compares them.
+and the table of topics. README's headline numbers come from the results, the changelog's renamed settings from the
+code, and the method's table of the paper's steps from README. `make docs` writes all before it builds the site;
+tests/test_docs.py compares them. The pages are plain Markdown, so that they can be read on GitHub, too.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from placegraph.tools.graph import dataflow_table, topic_table
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "results"
-README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
+README, CHANGELOG, METHOD = ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "docs/method.md"
 HEADLINES = (  # in README: what, the experiment's id, its value's name
     ("Five generated houses: trajectory, ATE rmse", "five_trajectory", "ATE rmse"),
     ("Five houses: rooms, F1 at IoU .5", "five_floors_rooms", "rooms F1 at IoU .5"),
@@ -33,13 +35,14 @@ HEADLINES = (  # in README: what, the experiment's id, its value's name
     ("Five houses: objects at IoU .25, recall", "five_objects", "recall"),
     ("Five houses: questions about the maps, Acc@.25", "five_questions", "Acc@.25"),
     ("Questions about true graphs, exact object", "true_graphs", "exact object"),
-    ("Sentences of people read exactly (Nr3D)", "people", "exact program"),
+    ("Human-written sentences parsed exactly (Nr3D)", "people", "exact program"),
     ("7-Scenes kitchen: trajectory, ATE rmse", "kitchen_trajectory", "ATE rmse"),
     ("7-Scenes kitchen: end to end on two CPU cores", "kitchen_speed", "end to end, 10 processes"),
     ("One question, median", "latency", "median"),
 )
 CODE_WIDTH = 88  # of commands: what the site shows without scrolling
 WIDTH = 118  # of generated prose; rows of tables may be longer
+SHELL_WORD = re.compile(r"""(?:[^\s"']|"[^"]*"|'[^']*')+""")
 GOAL = re.compile(r"(<=|>=) (-?[0-9.]+)")
 VALUE_NAMES = {Path: "PATH", int: "N", float: "NUMBER"}
 MADE = "<!-- Made by docs/generate.py: do not edit. -->"
@@ -171,7 +174,8 @@ def results_page() -> str:
 def _experiment(experiment: _Provenance, table: list[str]) -> list[str]:
     commit = "Measured at" if experiment.commit_is == "measured" else "Recorded by"
     source = f"{commit} commit `{experiment.commit}`, {experiment.date}, machine `{experiment.machine}`."
-    lines = [f"### {experiment.title} {{#{experiment.id}}}", "", *table, ""]
+    anchor = f'<a id="{experiment.id}"></a>'  # understood by GitHub and by the site
+    lines = [anchor, "", f"### {experiment.title}", "", *table, ""]
     if experiment.command:
         lines += ["```sh", *(part for line in experiment.command for part in _continued(line)), "```", ""]
     notes = [experiment.measured_by] * bool(experiment.measured_by) + experiment.notes
@@ -179,9 +183,20 @@ def _experiment(experiment: _Provenance, table: list[str]) -> list[str]:
 
 
 def _continued(command: str) -> list[str]:
-    """One shell command, with backslashes where it would be too long."""
-    lines = textwrap.wrap(command, CODE_WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
-    return [f"{line} \\" for line in lines[:-1]] + lines[-1:]
+    """One shell command over lines that fit, split by backslashes between its words; a comment stands above it.
+
+    Quoted words and comments stay whole, so that what is copied from the page runs.
+    """
+    if len(command) <= CODE_WIDTH:
+        return [command]
+    code, mark, comment = command.partition("  # ")
+    lines: list[str] = []
+    for word in SHELL_WORD.findall(code):
+        if lines and len(lines[-1]) + len(word) < CODE_WIDTH - len(" \\"):
+            lines[-1] += f" {word}"
+        else:
+            lines.append(f"    {word}" if lines else word)
+    return [f"# {comment}"] * bool(mark) + [f"{line} \\" for line in lines[:-1]] + lines[-1:]
 
 
 def commands_page() -> str:
@@ -209,7 +224,7 @@ def commands_page() -> str:
 def _command(name: str, command: Any, level: int) -> list[str]:
     """The section of a command, and of its subcommands."""
     anchor = name.replace(" ", "-")
-    lines = [f"{'#' * level} {name} {{#{anchor}}}", ""]
+    lines = [f"{'#' * level} {name}", ""]  # the anchor is what GitHub and the site make of this heading
     for paragraph in (command.help or "").split("\n\n"):
         lines += [*_wrapped(_escaped(" ".join(paragraph.split()))), ""]
     subcommands = getattr(command, "commands", None)
@@ -227,7 +242,10 @@ def _command(name: str, command: Any, level: int) -> list[str]:
 
 
 def _argument(parameter: Any) -> str:
-    return str(parameter.metavar or parameter.name.upper()).strip("[]")
+    """The argument as usage lines write it: in brackets when it may be left out, with dots when it repeats."""
+    name = str(parameter.metavar or parameter.name.upper()).replace("...", "").strip("[]")
+    shown = name if parameter.required else f"[{name}]"
+    return f"{shown}..." if parameter.nargs == -1 else shown
 
 
 def _spelled(parameter: Any) -> str:
@@ -311,10 +329,19 @@ def _setting(path: str) -> str:
     return f"`[nodes.{'.'.join(filter(None, (node, tables)))}] {key}`"
 
 
+def method_page() -> str:
+    """docs/method.md with README's table of the paper's steps."""
+    _, _, rest = README.read_text().partition("<!-- paper table: docs/generate.py copies it into docs/method.md -->\n")
+    header, _, *rows = rest.partition("\n<!-- end of paper table -->")[0].splitlines()
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in (header, *rows)]
+    return _with_table(METHOD, "paper table", cells[0], cells[1:])
+
+
 def _with_table(path: Path, name: str, columns: list[str], rows: list[list[str]]) -> str:
     """The text of a file with the table between its two marks of that name replaced."""
     start, end = f"<!-- {name}: made by docs/generate.py -->", f"<!-- end of {name} -->"
-    before, _, rest = path.read_text().partition(start)
+    before, mark, rest = path.read_text().partition(start)
+    assert mark, f"{path} has no line {start}"
     return "\n".join([before + start, *_table(columns, rows), end]) + rest.partition(end)[2]
 
 
@@ -324,6 +351,7 @@ PAGES = {
     ROOT / "docs/dataflow.md": dataflow_page,
     README: readme_page,
     CHANGELOG: changelog_page,
+    METHOD: method_page,
 }
 
 

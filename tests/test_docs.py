@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -75,6 +76,32 @@ def test_commands_named_exist(path: Path) -> None:
             assert name in commands, code
             subcommands = getattr(commands[name], "commands", None)
             assert not subcommands or not sub or sub in subcommands, code
+
+
+@pytest.mark.parametrize(
+    "path", [*WRITTEN, ROOT / "docs/results.md", ROOT / "examples/README.md"], ids=lambda p: p.name
+)
+def test_command_lines_have_the_arguments_that_they_need(path: Path) -> None:
+    for block in re.findall(r"```sh\n(.*?)```", path.read_text(), re.DOTALL):
+        for line in block.replace("\\\n", " ").splitlines():
+            words = shlex.split(line, comments=True)
+            for start in [i for i, word in enumerate(words) if re.fullmatch(r"(\S*/bin/)?placegraph", word)]:
+                if words[start - 1 : start] == ["cd"]:
+                    continue
+                command, arguments = typer.main.get_command(app), words[start + 1 :]
+                arguments = arguments[: arguments.index("&&")] if "&&" in arguments else arguments
+                while hasattr(command, "commands"):
+                    command, arguments = command.commands[arguments[0]], arguments[1:]
+                command.make_context("placegraph", list(arguments))  # raises UsageError
+
+
+def test_made_usage_and_command_lines() -> None:
+    graph = typer.main.get_command(app).commands["graph"]
+    assert "placegraph graph [MAP] [OPTIONS]" in GENERATOR._command("graph", graph, 2)
+    long = 'placegraph x --first "two words" ' + "--more value " * 6 + "--last 'three more words'  # needs \"a\""
+    lines = GENERATOR._continued(long)
+    assert lines[0] == '# needs "a"' and all(len(line) <= GENERATOR.CODE_WIDTH for line in lines)
+    assert shlex.split("\n".join(lines).replace("\\\n", " "), comments=True) == shlex.split(long, comments=True)
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/design.md"])

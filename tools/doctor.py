@@ -52,7 +52,7 @@ def _machine() -> list[Finding]:
         Finding(
             "disk",
             "ok" if free_gb > 2 else "note",
-            f"{free_gb:.0f} GB free here; a recording takes about 1 MB a keyframe",
+            f"{free_gb:.0f} GB free here; a recording takes about 1.3 MB per keyframe",
         ),
     ]
 

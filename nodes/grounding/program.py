@@ -2,7 +2,7 @@
 
 One schema for everything people say of an object: attributes, anchors with conditions of their own, relations,
 negation, ordinals, superlatives, groups, viewpoints, room and floor. The conventions of `CONDITIONS` come from reading
-400 requests of people (Nr3D). Not as in the paper, which has targets and anchors only.
+400 human-written requests (Nr3D). Not as in the paper, which has targets and anchors only.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How well requests are parsed: `python tests/measurements/request_parsing.py [adapter,examples,plain,rules] [-v]`.
 
-On the 100 sentences of people whose programs were written by hand (human_programs.jsonl; the sentences lie in
+On the 100 human-written sentences whose programs were written by hand (human_programs.jsonl; the sentences lie in
 ../shared), and on 300 generated ones with nouns and phrasings that training never says. "noun": the target's noun.
 """
 
@@ -29,7 +29,7 @@ SENTENCES = ROOT.parent / "shared" / "data" / "language" / "human_requests.jsonl
 
 
 def people():
-    """Sentences of people with the programs that are right."""
+    """Human-written sentences with the programs that are right."""
     lines = SENTENCES.read_text("utf-8").splitlines()
     for line in PROGRAMS.read_text("utf-8").splitlines():
         label = json.loads(line)

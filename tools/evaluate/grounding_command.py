@@ -29,7 +29,7 @@ HEADS = ("exact id", "Acc@.1", "Acc@.25", "Acc@.5", "Acc@.75", "not in map", "er
 
 
 def evaluate_grounding(
-    maps: Annotated[list[Path] | None, typer.Argument(metavar="[MAP]...", help="Map folders.")] = None,
+    maps: Annotated[list[Path] | None, typer.Argument(metavar="MAP", help="Map folders.")] = None,
     source: Annotated[
         list[Path] | None, typer.Option(help="The house of each map, in the same order; its questions are asked.")
     ] = None,

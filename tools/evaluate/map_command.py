@@ -12,7 +12,7 @@ from placegraph.runtime.errors import ConfigError
 
 
 def evaluate_map(
-    maps: Annotated[list[Path], typer.Argument(metavar="MAP...", help="Map folders that `placegraph run` wrote.")],
+    maps: Annotated[list[Path], typer.Argument(metavar="MAP", help="Map folders that `placegraph run` wrote.")],
     source: Annotated[
         list[Path] | None, typer.Option(help="The data set with the given poses; with a truth/, all else is scored.")
     ] = None,

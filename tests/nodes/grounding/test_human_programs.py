@@ -1,4 +1,4 @@
-"""The hand-made programs of people's requests can be written by the model: valid, and of each request's own words."""
+"""The hand-made programs of human-written requests can be written by the model: valid, of each request's own words."""
 
 import json
 from itertools import chain
@@ -50,7 +50,7 @@ def test_alternatives_are_different_programs(label):
 
 
 @pytest.mark.weights
-@pytest.mark.skipif(not REQUESTS.exists(), reason="people's requests lie beside a development checkout")
+@pytest.mark.skipif(not REQUESTS.exists(), reason="human-written requests lie beside a development checkout")
 def test_nouns_and_words_are_the_requests_own():
     sentences = [json.loads(line)["text"] for line in REQUESTS.read_text().splitlines()]
     strange = []
@@ -66,7 +66,7 @@ def test_nouns_and_words_are_the_requests_own():
 
 
 @pytest.mark.weights
-@pytest.mark.skipif(not REQUESTS.exists(), reason="people's requests lie beside a development checkout")
+@pytest.mark.skipif(not REQUESTS.exists(), reason="human-written requests lie beside a development checkout")
 def test_the_packaged_reader_reads_people():
     sentences = [json.loads(line)["text"] for line in REQUESTS.read_text().splitlines()]
     model = LanguageModel(adapter_path=default_adapter_path())

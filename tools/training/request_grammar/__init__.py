@@ -1,7 +1,7 @@
 """Generated requests with their programs for training the reader: a grammar with many phrasings of each program.
 
 Whole phrasings and nouns are held out for validation (phrase_grammar.is_held_out). Meanings follow the conventions of
-nodes/grounding/program.py. The grammar was written after reading 400 requests of people; none of them is in it.
+nodes/grounding/program.py. The grammar was written after reading 400 human-written requests; none of them is in it.
 """
 
 from __future__ import annotations
