@@ -38,7 +38,8 @@ class Node:
     inputs: tuple[type[Message], ...] = ()  # set on the class; in __init__ only where they depend on settings
     outputs: tuple[type[Message], ...] = ()
     optional: tuple[type[Message], ...] = ()  # inputs that no node needs to produce
-    restartable: ClassVar[bool] = False  # live: started again after a crash, as it has no state to lose
+    # whether a live run starts it again after a crash: what comes later must not need what it knew before
+    restartable: ClassVar[bool] = False
     # (question kind, answer kind): served as a queryable
     serves: ClassVar[tuple[type[Message], type[Message]] | None] = None
 

@@ -46,6 +46,7 @@ class Naming(Node):
     config_type = NamingConfig
     inputs = (Graph,)
     outputs = (NamedGraph,)
+    restartable = True  # it only caches; a graph that a crash loses is followed by the next, which is complete
     config: NamingConfig
 
     def __init__(self, config: NamingConfig, context: Context) -> None:
