@@ -28,7 +28,7 @@ from placegraph.tools.training.networks import ObjectNetwork, TaggerNetwork  # n
 from placegraph.tools.training.segmenter_training import MaskNetwork  # noqa: E402
 from placegraph.tools.training.view_rendering import visible_boxes  # noqa: E402
 
-# the exporter is the older one on purpose, see export.py
+# the exporter is the older one on purpose, see onnx_export.py
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::UserWarning")
 torch.set_num_threads(1)
 NETWORKS = ("house_detector", "house_tagger", "house_mask_encoder", "house_mask_decoder")
@@ -57,7 +57,7 @@ def write_checkpoints(work):
 
 @pytest.fixture(scope="module")
 def packed(tmp_path_factory):
-    """Folder, lines said and feeds by network; quantising, tested in test_export.py, only copies here."""
+    """Folder, lines said and feeds by network; quantising, tested in test_onnx_export.py, only copies here."""
     folder = tmp_path_factory.mktemp("pack")
     write_shard(folder / "calibration" / "10000")
     write_checkpoints(folder / "work")

@@ -12,7 +12,7 @@ torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 from placegraph.tools.training.networks import Conv, Csp  # noqa: E402
 from placegraph.tools.training.onnx_export import export_onnx, image_feed, quantise  # noqa: E402
 
-# the exporter is the older one on purpose, see export.py
+# the exporter is the older one on purpose, see onnx_export.py
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::UserWarning")
 torch.set_num_threads(1)
 
