@@ -78,6 +78,7 @@ RENAMED_SETTINGS = {
     "pose_graph.pull_m": "pose_graph.min_loop_error_m",
     "pose_graph.pull_rad": "pose_graph.min_loop_error_rad",
     "pose_graph.slack": "pose_graph.keyframes_before_loop",
+    "tagger.max_objects": "tagger.max_tags",
 }
 
 # `<node>.<path of keys>` to the reason why there is no such setting any more
