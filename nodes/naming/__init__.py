@@ -40,7 +40,7 @@ class NamingConfig(NodeConfig):
     n_ctx: int = Field(N_CTX, ge=64)  # tokens
 
 
-class Naming(Node):
+class NamingNode(Node):
     """Names the rooms and locations of each graph."""
 
     config_type = NamingConfig
@@ -100,4 +100,4 @@ class Naming(Node):
         return graph
 
 
-NODE = Naming
+NODE = NamingNode
