@@ -42,7 +42,7 @@ class FusionConfig(NodeConfig):
     min_observations: int = Field(default=3, ge=1)  # ConceptGraphs; an object seen less often is not in the Map
     # Of the keyframes that showed an object, those that must have recognised it. Of house 9002's 156 objects 18 have
     # less, 17 of them wrong.
-    recognised_share: float = Field(default=0.5, ge=0, le=1)
+    recognized_share: float = Field(default=0.5, ge=0, le=1)
     # Of an object's strongest name, the mean over the views that recognised it. Scores are the detector's, so the
     # dataflow's file sets the value.
     min_score: float = Field(default=0.0, ge=0, le=1)
@@ -152,7 +152,7 @@ class FusionNode(Node):
 
     def _is_stable(self, instance: ObjectInstance) -> bool:
         c = self.config
-        min_observations = max(c.min_observations, c.recognised_share * instance.times_visible)
+        min_observations = max(c.min_observations, c.recognized_share * instance.times_visible)
         return (
             instance.observations >= min_observations
             and max(instance.votes.values()) >= c.min_score * instance.observations

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from placegraph.nodes.pose_graph.level_surfaces import LevelSurfaceConfig, up_from_level_surfaces
 from placegraph.nodes.pose_graph.loop_detector import Loop, LoopDetector, LoopDetectorConfig
-from placegraph.nodes.pose_graph.optimizer import Edge, UpMeasurement, optimise
+from placegraph.nodes.pose_graph.optimizer import Edge, UpMeasurement, optimize
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.messages import Correction, Keyframe, Message
 from placegraph.runtime.node import Context, Node, NodeConfig
@@ -62,7 +62,7 @@ class PoseGraphNode(Node):
         self._published_poses = np.zeros((0, 4, 4))  # as the map has them
         self._travelled_m = np.zeros(0)
         self._pending_loops: list[int] = []  # first keyframes of loops since the last optimisation
-        self._next_optimisation = 0  # number of the first keyframe that may start it
+        self._next_optimization = 0  # number of the first keyframe that may start it
         self._edges: list[Edge] = []
         self._ups: list[UpMeasurement] = []
 
@@ -74,11 +74,11 @@ class PoseGraphNode(Node):
         loops = self._measure(message)
         moved = np.zeros(0, np.int64)
         self._pending_loops += [loop.first for loop in loops if self._contradicts_poses(loop)]
-        if self._pending_loops and new >= self._next_optimisation:
+        if self._pending_loops and new >= self._next_optimization:
             fixed = min(self._pending_loops) - self.config.keyframes_before_loop
-            self._poses = optimise(self._poses, self._edges, self._ups, fixed)
+            self._poses = optimize(self._poses, self._edges, self._ups, fixed)
             moved, self._pending_loops = self._moved(), []
-            self._next_optimisation = new + (new - max(0, fixed)) // MOVED_PER_WAIT
+            self._next_optimization = new + (new - max(0, fixed)) // MOVED_PER_WAIT
         self._published_poses[moved] = self._poses[moved]
         self._published_poses[new] = self._poses[new]
         return [

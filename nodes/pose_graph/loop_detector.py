@@ -135,5 +135,5 @@ def _color_layout(color: U8) -> F32:
     """Unit vector of an image's coarse colours; without their mean, because brightness changes from view to view."""
     lab = cv2.cvtColor(color, cv2.COLOR_RGB2LAB)
     small = cv2.resize(lab, LAYOUT_SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
-    centred = (small - small.mean(axis=(0, 1))).ravel()
-    return np.asarray(centred / max(float(np.linalg.norm(centred)), 1e-6), np.float32)
+    centered = (small - small.mean(axis=(0, 1))).ravel()
+    return np.asarray(centered / max(float(np.linalg.norm(centered)), 1e-6), np.float32)

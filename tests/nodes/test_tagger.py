@@ -39,10 +39,10 @@ def test_a_keyframe_gives_its_tags(start):
 
 
 def test_min_score_and_max_tags(start):
-    grey = keyframe((0, 0, 0))  # three logits of 0
-    assert start(model="tiny_tags").step(grey)[0].names == ("red", "grey", "blue")
-    assert start(model="tiny_tags", max_tags=2).step(grey)[0].names == ("red", "grey")
-    (none,) = start(model="tiny_tags", min_score=0.5).step(grey)
+    gray = keyframe((0, 0, 0))  # three logits of 0
+    assert start(model="tiny_tags").step(gray)[0].names == ("red", "grey", "blue")
+    assert start(model="tiny_tags", max_tags=2).step(gray)[0].names == ("red", "grey")
+    (none,) = start(model="tiny_tags", min_score=0.5).step(gray)
     none.check()
     assert none.names == ()
 

@@ -65,9 +65,7 @@ class LocationSamples:
         house, k = self._rooms[self._order.pop()]
         scan = self._houses[house][k]
         if self._random.random() < JOINED:
-            near = [
-                neighbour for neighbour in self._houses[house] if neighbour is not scan and _adjacent(scan, neighbour)
-            ]
+            near = [neighbor for neighbor in self._houses[house] if neighbor is not scan and _adjacent(scan, neighbor)]
             if near:
                 scan = join(scan, near[int(self._random.integers(len(near)))])
         scan = add_mapping_errors(scan, self._random, missing=float(self._random.uniform(0, 0.35)))

@@ -63,7 +63,7 @@ def packed(tmp_path_factory):
     write_checkpoints(folder / "work")
     feeds, kept = {}, {}
 
-    def quantise(float_file, file, given, keep):
+    def quantize(float_file, file, given, keep):
         feeds[file.stem], kept[file.stem] = list(given), keep
         shutil.copy(float_file, file)
         return file
@@ -73,7 +73,7 @@ def packed(tmp_path_factory):
         patch.setattr(pack_module, "MASK_SIZE", (64, 64))
         patch.setattr(pack_module, "TAG_SIZE", 64)
         patch.setattr(pack_module, "CALIBRATION_VIEWS", 4)
-        patch.setattr(pack_module, "quantise", quantise)
+        patch.setattr(pack_module, "quantize", quantize)
         lines = list(package_networks(folder / "work", folder / "calibration"))
     return folder / "work" / "onnx", lines, feeds, kept
 
@@ -84,7 +84,7 @@ def test_what_is_trained_is_packed_alone(packed, tmp_path, monkeypatch):
     folder, _, _, _ = packed
     shutil.copy(folder.parent / "refined.pt", tmp_path)
     monkeypatch.setattr(pack_module, "SIZES", ((64, 64),))
-    monkeypatch.setattr(pack_module, "quantise", lambda float_file, file, feeds, keep: shutil.copy(float_file, file))
+    monkeypatch.setattr(pack_module, "quantize", lambda float_file, file, feeds, keep: shutil.copy(float_file, file))
     lines = list(package_networks(tmp_path, folder.parent.parent / "calibration"))
     assert [line.split(":")[0] for line in lines] == ["float/house_detector.onnx", "house_detector.onnx"]
 
