@@ -5,12 +5,15 @@ from __future__ import annotations
 # `<node>.<path of keys>` to the new path; one line each, in alphabetical order
 RENAMED_SETTINGS = {
     "fusion.least_score": "fusion.min_score",
+    "fusion.map_every": "fusion.map_every_keyframes",
     "fusion.sight": "fusion.visibility",
     "fusion.submap.least_move_m": "fusion.submap.min_move_m",
     "fusion.submap.least_turn_deg": "fusion.submap.min_turn_deg",
     "grounding.location_types": "naming.location_types",
     "grounding.name_places": "naming.method",
     "grounding.room_types": "naming.room_types",
+    "hierarchy.locations.band_high": "hierarchy.locations.band_high_share",
+    "hierarchy.locations.band_low": "hierarchy.locations.band_low_share",
     "hierarchy.locations.least_area_m2": "hierarchy.locations.min_area_m2",
     "hierarchy.locations.least_objects": "hierarchy.locations.min_objects",
     "hierarchy.rooms.least_slice_m": "hierarchy.rooms.min_slice_m",

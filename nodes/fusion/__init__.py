@@ -28,10 +28,10 @@ from placegraph.runtime.vision.geometry import backproject, is_rigid, transform
 class FusionConfig(NodeConfig):
     """Settings of the map."""
 
-    map_every: int = Field(default=10, ge=1)  # keyframes between Maps, at least ...
-    map_share: float = Field(
-        default=0.05, ge=0
-    )  # ... and this share of all so far, so that their cost stays in proportion
+    # Between two Maps are at least so many keyframes, and at least this share of all keyframes so far: a Map of a long
+    # run costs more.
+    map_every_keyframes: int = Field(default=10, ge=1)
+    map_share: float = Field(default=0.05, ge=0)
     voxel_m: float = Field(default=0.05, gt=0)  # chosen by hand; also the cell of the room layer
     stride: int = Field(default=4, ge=1)  # every 4th pixel each way: 2 cm apart at 3 m, under half a voxel
     max_depth_m: float = Field(default=5.0, gt=0)
@@ -53,7 +53,7 @@ class FusionConfig(NodeConfig):
 
 
 class FusionNode(Node):
-    """Publishes a Map every `map_every` keyframes, more rarely in a long run, and a final one.
+    """Publishes a Map every `map_every_keyframes` keyframes, more rarely in a long run, and a final one.
 
     With a pose graph, keyframes are fused at its corrected poses, and the map moves when it corrects earlier ones.
     """
@@ -78,7 +78,7 @@ class FusionNode(Node):
         self._latest: Message | None = None  # the keyframe whose frame id and stamp the next Map carries
         self._last: LastKeyframe | None = None
         self._revision = 0
-        self._next_map = config.map_every  # keyframes from the start to the next Map
+        self._next_map = config.map_every_keyframes  # keyframes from the start to the next Map
         self._ended = False
 
     def step(self, message: Message) -> Sequence[Message]:
@@ -160,7 +160,7 @@ class FusionNode(Node):
 
     def _make_map(self, final: bool) -> Map:
         c = self.config
-        self._next_map = len(self._submaps) + max(c.map_every, round(c.map_share * len(self._submaps)))
+        self._next_map = len(self._submaps) + max(c.map_every_keyframes, round(c.map_share * len(self._submaps)))
         source = self._latest or self._last
         assert source is not None
         revision, self._revision = self._revision, self._revision + 1

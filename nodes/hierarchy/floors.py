@@ -43,16 +43,16 @@ class FloorConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 class FloorSpan:
     """Heights in metres, world frame: of a floor, of its ceiling or highest point, and of the zone of its points."""
 
-    low: float
-    high: float
-    zone_low: float
-    zone_high: float
-    expected_ceiling: float = -np.inf  # of a ceiling that was not seen
+    low_m: float
+    high_m: float
+    zone_low_m: float
+    zone_high_m: float
+    expected_ceiling_m: float = -np.inf  # of a ceiling that was not seen
 
     @property
-    def ceiling(self) -> float:
+    def ceiling_m(self) -> float:
         """The seen ceiling, or the expected one, or the highest point above that."""
-        return max(self.high, self.expected_ceiling)
+        return max(self.high_m, self.expected_ceiling_m)
 
 
 @dataclass(frozen=True)

@@ -74,10 +74,10 @@ def room_areas(labels: I32, grid: PlanGrid, config: RoomConfig) -> list[RoomArea
 
 def wall_mask(points_world: Points, span: FloorSpan, grid: PlanGrid, config: RoomConfig) -> Bool:
     """Cells where the slice between furniture and ceiling is filled: walls, and the lintels of open doors."""
-    above = points_world[:, 2] - span.low
-    low, high = config.slice_low_m, span.high - span.low - config.slice_high_m
+    above = points_world[:, 2] - span.low_m
+    low, high = config.slice_low_m, span.high_m - span.low_m - config.slice_high_m
     if high - low < config.min_slice_m:
-        low, high = config.partial_low_m, max(span.high - span.low, config.partial_low_m + config.level_m)
+        low, high = config.partial_low_m, max(span.high_m - span.low_m, config.partial_low_m + config.level_m)
     tall = (above >= low) & (above <= high)
     points = points_world[tall]
     levels = np.floor((above[tall] - low) / config.level_m).astype(np.int64)

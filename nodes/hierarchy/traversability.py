@@ -73,7 +73,7 @@ def compute_traversability(
     drop_off_points_world: (Q, 3), see `drop_off_points`; path_segments_world: (K, 2, 3) of the camera's path on this
     floor. All metres, world frame; free_cell_m: size of the free cells in plan.
     """
-    above = points_world[:, 2] - span.low
+    above = points_world[:, 2] - span.low_m
     solid = (above > config.step_m) & (above < config.robot_height_m)
     obstacle_points = points_world[solid]
     obstacle = _obstacles(_count(obstacle_points, grid), config)
@@ -87,13 +87,13 @@ def compute_traversability(
     passable = ((floor & free) | crossed) & ~obstacle | path
     clearance = _clearance(passable, grid.cell_m)
     levels = _obstacle_levels(obstacle_points, above[solid], grid)
-    return TraversabilityMap(grid, span.low, passable, clearance, (clearance >= config.robot_radius_m) | path, levels)
+    return TraversabilityMap(grid, span.low_m, passable, clearance, (clearance >= config.robot_radius_m) | path, levels)
 
 
 def drop_off_points(points_world: Points, span: FloorSpan, config: TraversabilityConfig) -> Points:
     """Of all points (P, 3) those (Q, 3) below the floor that show the ground falling away."""
     z = points_world[:, 2]
-    return points_world[(z > span.low - config.drop_m) & (z < span.low - 2 * config.floor_band_m)]
+    return points_world[(z > span.low_m - config.drop_m) & (z < span.low_m - 2 * config.floor_band_m)]
 
 
 def _count(points: Points, grid: PlanGrid) -> I64:
@@ -129,7 +129,7 @@ def _path_cells(segments: F64, grid: PlanGrid) -> Bool:
 
 
 def _free_cells(points: Points, cell_m: float, grid: PlanGrid, span: FloorSpan, config: TraversabilityConfig) -> Bool:
-    above = points[:, 2] - span.low
+    above = points[:, 2] - span.low_m
     return grid.image(points[(above > 0) & (above < config.robot_height_m)], cell_m) > 0
 
 

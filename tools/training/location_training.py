@@ -99,7 +99,7 @@ def random_transform(scan: RoomScan, random: np.random.Generator) -> RoomScan:
 
 def birds_eye_sample(scan: RoomScan) -> tuple[U8, LocationTargets]:
     """The bird's-eye image of a scan, and boxes and masks of the locations of which enough was mapped."""
-    image, grid = birds_eye_image(scan.objects, span_of(scan), LocationConfig().band_high)
+    image, grid = birds_eye_image(scan.objects, span_of(scan), LocationConfig().band_high_share)
     seen = np.bincount([location for location in scan.location if location >= 0], minlength=len(scan.outlines))
     boxes, masks = [], []
     for outline in (xy for xy, count in zip(scan.outlines, seen, strict=True) if count >= MIN_OBJECTS):
