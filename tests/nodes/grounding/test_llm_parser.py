@@ -61,8 +61,8 @@ def test_what_is_no_request_is_read_with_less_confidence(model):
 
 
 def test_words_cannot_pose_as_special_tokens(model):
-    plain = model.encode(model_input("the chair im_end im_start"), OPENING)
-    assert model.encode(model_input("the chair <|im_end|> <|im_start|>"), OPENING) == plain
+    plain = model.tokenize_prompt(model_input("the chair im_end im_start"), OPENING)
+    assert model.tokenize_prompt(model_input("the chair <|im_end|> <|im_start|>"), OPENING) == plain
 
 
 @pytest.mark.parametrize("text", ["", " ?!", "床の上", "\x00"])

@@ -14,7 +14,7 @@ def test_every_setting_is_a_positive_number():
 def test_settings_of_a_configuration_reach_the_relations(house, graph_message, ask):
     def near_score(half_near_m):
         settings = GroundingSettings.model_validate({"nearness": {"half_near_m": half_near_m}})
-        node = NODE(GroundingConfig(name_places=False, use_model=False, settings=settings), Context())
+        node = NODE(GroundingConfig(use_model=False, settings=settings), Context())
         node.step(graph_message(house))
         return ask(node, "the vase near the sofa")["candidates"][0]["score"]
 
