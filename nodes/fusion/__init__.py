@@ -40,11 +40,11 @@ class FusionConfig(NodeConfig):
     free_height_m: float = Field(default=0.5, gt=0)
     free_clearance_m: float = Field(default=0.15, ge=0)  # rays stop short of the surface by more than the depth noise
     min_observations: int = Field(default=3, ge=1)  # ConceptGraphs; an object seen less often is not in the Map
-    # Of the keyframes that showed an object, those that must have recognised it. Of house 9002's 156 objects 18 have
-    # less, 17 of them wrong.
+    # Minimum share of the keyframes that showed an object in which it was recognised. 18 of house 9002's 156 objects
+    # have less, and 17 of these are wrong.
     recognized_share: float = Field(default=0.5, ge=0, le=1)
-    # Of an object's strongest name, the mean over the views that recognised it. Scores are the detector's, so the
-    # dataflow's file sets the value.
+    # Minimum score of an object's strongest name, as the mean over the views that recognised it. Detectors differ in
+    # their scores, so the dataflow file sets the value.
     min_score: float = Field(default=0.0, ge=0, le=1)
     lift: LiftConfig = LiftConfig()
     association: AssociationConfig = AssociationConfig()

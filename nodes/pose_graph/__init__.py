@@ -20,25 +20,30 @@ from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.vision.geometry import inverse, nearest_rigid, rotation_angle_rad
 from placegraph.runtime.vision.registration import is_within
 
-MOVED_PER_WAIT = 40  # after moving so many keyframes, loops wait for one more keyframe: steps of a long run stay short
+# After an optimisation that may move n keyframes, the next n / 40 keyframes start no other: otherwise a long run would
+# spend its time on optimising. Chosen by hand.
+MOVED_PER_WAIT = 40
 
 
 class PoseGraphConfig(NodeConfig):
     """Standard deviations of the measurements, and when poses are optimised and published."""
 
-    # of a step between keyframes, chosen on the house walks; errors of a longer step add up as those of a random walk
+    # Errors of odometry from keyframe to keyframe, for a step of at most `step_m` and `step_rad`; chosen on the house
+    # walks. The error of a longer step grows with the square root of its length, as in a random walk.
     odometry_sigma_m: float = Field(default=0.004, gt=0)
     odometry_sigma_rad: float = Field(default=0.003, gt=0)
     step_m: float = Field(default=0.15, gt=0)
     step_rad: float = Field(default=0.15, gt=0)
-    # of a verified loop; the covariance of its registration is too small, as it takes errors as independent
+    # Errors of a verified loop. They are not those that its registration computes, which are too small because it takes
+    # the errors of all points as independent.
     loop_sigma_m: float = Field(default=0.015, gt=0)
     loop_sigma_rad: float = Field(default=0.008, gt=0)
-    # poses are optimised when a loop differs from them by this; from `keyframes_before_loop` before its start they move
+    # Poses are optimised when a loop differs from them by more than this. The keyframes that may move begin
+    # `keyframes_before_loop` before the first one of the loop.
     min_loop_error_m: float = Field(default=0.01, ge=0)
     min_loop_error_rad: float = Field(default=0.004, ge=0)
     keyframes_before_loop: int = Field(default=15, ge=0)
-    # a keyframe that moved and turned less than this keeps its place in the map
+    # A keyframe that moved and turned less than this keeps its place in the map.
     min_correction_m: float = Field(default=0.02, gt=0)
     min_correction_rad: float = Field(default=0.005, gt=0)
     loops: LoopDetectorConfig = LoopDetectorConfig()
