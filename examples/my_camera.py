@@ -1,4 +1,4 @@
-"""A camera of your own, complete: copy it to nodes/camera/my_camera.py and put your device in place of `open_device`.
+"""A camera of your own, complete: copy it to nodes/camera/ and put your device in place of `open_device`.
 
     [nodes.camera]
     source = "my_camera"
