@@ -18,10 +18,10 @@ def image_box_iou(box: F32, boxes: F32) -> F32:
     return np.asarray(box_iou(box.reshape(2, 2), boxes.reshape(-1, 2, 2)), np.float32)
 
 
-def corners_from_centres(centres: F32) -> F32:
+def corners_from_centers(centers: F32) -> F32:
     """(N, 4) cx cy w h to x_min y_min x_max y_max."""
-    half = centres[:, 2:] / 2
-    return np.concatenate([centres[:, :2] - half, centres[:, :2] + half], axis=1).astype(np.float32)
+    half = centers[:, 2:] / 2
+    return np.concatenate([centers[:, :2] - half, centers[:, :2] + half], axis=1).astype(np.float32)
 
 
 def non_maximum_suppression(boxes: F32, scores: F32, classes: I64, nms_iou: float) -> I64:

@@ -40,14 +40,14 @@ class Letterbox:
         return np.asarray(boxes * scale + shift, np.float32)
 
 
-def letterbox_image(image: U8, height: int, width: int, *, centred: bool) -> tuple[U8, Letterbox]:
+def letterbox_image(image: U8, height: int, width: int, *, centered: bool) -> tuple[U8, Letterbox]:
     """Resize (H, W, 3) to fit (height, width, 3) px with grey borders: around it, or only right and below."""
     image_height, image_width = image.shape[:2]
     ratio = min(height / image_height, width / image_width)
     new_height = min(max(round(image_height * ratio), 1), height)
     new_width = min(max(round(image_width * ratio), 1), width)
-    pad_x = (width - new_width) // 2 if centred else 0
-    pad_y = (height - new_height) // 2 if centred else 0
+    pad_x = (width - new_width) // 2 if centered else 0
+    pad_y = (height - new_height) // 2 if centered else 0
     canvas = np.full((height, width, 3), FILL, np.uint8)
     resized = cv2.resize(image, (new_width, new_height), interpolation=cv2.INTER_LINEAR)
     canvas[pad_y : pad_y + new_height, pad_x : pad_x + new_width] = resized

@@ -56,16 +56,16 @@ class FAMILY:
         """
         prompts = tuple(dict.fromkeys(names)) if self._text_input else self._labels
         feed, placed = prepare_input(image, self._height, self._width)
-        centres = [np.zeros((0, 4), np.float32)]
+        centers = [np.zeros((0, 4), np.float32)]
         classes, scores = [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
         step = self._slots or max(len(prompts), 1)
         for start in range(0, len(prompts), step):
             raw = self._run(feed, prompts[start : start + step])
             anchors, part, best = boxes.best_classes(raw[:, 4:], self._options.min_score)
-            centres.append(raw[anchors, :4])
+            centers.append(raw[anchors, :4])
             classes.append(part + start)
             scores.append(best)
-        boxes_px = placed.to_image(boxes.corners_from_centres(np.concatenate(centres)))
+        boxes_px = placed.to_image(boxes.corners_from_centers(np.concatenate(centers)))
         class_ids, best = np.concatenate(classes), np.concatenate(scores)
         kept = boxes.non_maximum_suppression(boxes_px, best, class_ids, self._options.nms_iou)
         return boxes.named_boxes(prompts, class_ids[kept], boxes_px[kept], best[kept])
@@ -96,7 +96,7 @@ class FAMILY:
 
 def prepare_input(image: U8, height: int, width: int) -> tuple[F32, Letterbox]:
     """Letterbox (H, W, 3) in the middle and scale to 0..1: (1, 3, height, width), and where the image lies in it."""
-    canvas, placed = letterbox_image(image, height, width, centred=True)
+    canvas, placed = letterbox_image(image, height, width, centered=True)
     feed = canvas.transpose(2, 0, 1)[None].astype(np.float32) / np.float32(255)
     return np.ascontiguousarray(feed), placed
 

@@ -102,7 +102,7 @@ class FAMILY:
         raw = np.asarray(outputs[self._boxes][0].T, np.float32)
         classes = len(self._labels)
         return _Raw(
-            placed.to_image(boxes.corners_from_centres(raw[:, :4])),
+            placed.to_image(boxes.corners_from_centers(raw[:, :4])),
             raw[:, 4 : 4 + classes],
             raw[:, 4 + classes :],
             np.asarray(outputs[self._prototypes][0], np.float32),

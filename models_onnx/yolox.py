@@ -46,22 +46,22 @@ class FAMILY:
 
     def detect(self, image: U8, names: Sequence[str]) -> NamedBoxes:
         """Boxes of the network's own classes; `names` are ignored. Raises ModelError when it cannot be run."""
-        canvas, placed = letterbox_image(image, self._height, self._width, centred=False)
+        canvas, placed = letterbox_image(image, self._height, self._width, centered=False)
         feed = canvas[:, :, ::-1].astype(np.float32).transpose(2, 0, 1)[None]
         raw = self._session.run({self._input: np.ascontiguousarray(feed)})[self._output][0]
         if len(raw) != len(self._cells):
             raise ModelError(f"{self._session.path}: {len(raw)} anchors, expected {len(self._cells)} of {STRIDES}")
         anchors, classes, scores = boxes.best_classes(raw[:, 4:5] * raw[:, 5:], self._options.min_score)
-        boxes_px = placed.to_image(boxes.corners_from_centres(self._decode(raw[anchors, :4], anchors)))
+        boxes_px = placed.to_image(boxes.corners_from_centers(self._decode(raw[anchors, :4], anchors)))
         kept = boxes.non_maximum_suppression(boxes_px, scores, classes, self._options.nms_iou)
         return boxes.named_boxes(self._labels, classes[kept], boxes_px[kept], scores[kept])
 
     def _decode(self, raw: F32, anchors: I64) -> F32:
         """Grid offsets and log sizes (K, 4) to cx cy w h in px of the input."""
         strides = self._strides[anchors, None]
-        centres = (raw[:, :2] + self._cells[anchors]) * strides
+        centers = (raw[:, :2] + self._cells[anchors]) * strides
         sizes = np.exp(np.minimum(raw[:, 2:], 10)) * strides  # e^10 cells exceed any input: only guards the overflow
-        return np.concatenate([centres, sizes], axis=1).astype(np.float32)
+        return np.concatenate([centers, sizes], axis=1).astype(np.float32)
 
 
 def _grid(height: int, width: int) -> tuple[F32, F32]:

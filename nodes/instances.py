@@ -1,4 +1,4 @@
-"""Node `instances`: keyframe to boxes and masks, by one network in place of tagger, detector and segmenter."""
+"""Node `instances`: keyframe to boxes and masks by one network, in place of tagger, detector and segmenter."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class InstancesConfig(NodeConfig):
 class InstancesNode(Node):
     """Find objects with their masks.
 
-    Not as in the paper, which runs three networks: for machines that are too small for them.
+    Not as in the paper, which runs a tagger, a detector and a segmenter: one network suits machines that are too small
+    for three. Such a dataflow needs no tagger: without a detector, only the recorder reads tags.
     """
 
     config_type = InstancesConfig

@@ -22,7 +22,7 @@ class PlaybackConfig(NodeConfig):
     incomplete: bool = False  # True: a recording that was cut is played up to its last keyframe
 
 
-class Playback(Source):
+class PlaybackNode(Source):
     """Produces the recorded messages of its kinds, bit for bit and in recorded order."""
 
     config_type: ClassVar[type[NodeConfig]] = PlaybackConfig
@@ -79,4 +79,4 @@ def _require_keyframes(path: Path, counts: dict[str, int]) -> None:
     raise SourceError(f"{path}: has no Keyframe, only: {', '.join(counts) or 'nothing'}")
 
 
-NODE = Playback
+NODE = PlaybackNode

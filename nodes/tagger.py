@@ -17,7 +17,7 @@ class TaggerConfig(NodeConfig):
 
     model: str  # a name of the manifest
     min_score: float = Field(default=0.0, ge=0, le=1)  # paper: the network's own thresholds decide
-    max_objects: int = Field(default=30, ge=1)  # tags kept of one image; bounds what the detector is asked for
+    max_tags: int = Field(default=30, ge=1)  # tags kept of one image; bounds what the detector is asked for
 
 
 class TaggerNode(Node):
@@ -39,7 +39,7 @@ class TaggerNode(Node):
         """A Keyframe gives its Tags, best first."""
         if not isinstance(message, Keyframe):
             raise TypeError(f"tagger takes Keyframe, not {type(message).__name__}")
-        tags = self._model.tag(message.color).best(self.config.min_score, self.config.max_objects)
+        tags = self._model.tag(message.color).best(self.config.min_score, self.config.max_tags)
         return [Tags(frame_id=message.frame_id, stamp_ns=message.stamp_ns, names=tags.names, scores=tags.scores)]
 
 

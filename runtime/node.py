@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
+import re
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -36,7 +38,8 @@ class Node:
     inputs: tuple[type[Message], ...] = ()  # set on the class; in __init__ only where they depend on settings
     outputs: tuple[type[Message], ...] = ()
     optional: tuple[type[Message], ...] = ()  # inputs that no node needs to produce
-    restartable: ClassVar[bool] = False  # live: started again after a crash, as it has no state to lose
+    # whether a live run starts it again after a crash: what comes later must not need what it knew before
+    restartable: ClassVar[bool] = False
     # (question kind, answer kind): served as a queryable
     serves: ClassVar[tuple[type[Message], type[Message]] | None] = None
 
@@ -91,8 +94,8 @@ class Context(BaseModel):
 
 def plugin(package: str, name: str, export: str, what: str) -> Any:
     """Import `<package>.<name>` and return its `export`; raises ConfigError listing the choices when it is unknown."""
-    choices = available(package)
-    if name not in choices:
+    if name not in available(package):
+        choices = [module for module in available(package) if _defines(f"{package}.{module}", export)]
         raise ConfigError(f"no {what} named {name!r}; there are: {', '.join(choices)}")
     try:
         module = importlib.import_module(f"{package}.{name}")
@@ -114,6 +117,13 @@ def available(package: str) -> list[str]:
     spec = importlib.util.find_spec(package)
     paths: Iterable[str] = (spec.submodule_search_locations or ()) if spec else ()
     return sorted(module.name for module in pkgutil.iter_modules(paths) if not module.name.startswith("_"))
+
+
+def _defines(module: str, export: str) -> bool:
+    # By its text: importing a module may need a package that is not installed.
+    spec = importlib.util.find_spec(module)
+    text = Path(spec.origin).read_text() if spec and spec.origin else ""
+    return re.search(rf"^(class )?{export}\b", text, re.MULTILINE) is not None
 
 
 def build_node(name: str, settings: dict[str, Any], context: Context) -> Node:

@@ -26,6 +26,8 @@ WRITTEN = [
 MAX_README_BYTES = 8192
 MAX_LINE = 120
 FOLDERS = "runtime|nodes|models_onnx|configs|tools|tests|docs|results|examples"
+CODE_FOLDERS = ("configs", "models_onnx", "nodes", "runtime", "tools", "tests", "examples")
+NOT_KEPT = ("models_onnx/weights", "configs/Replica")  # a folder that a user may fill; a folder of another repository
 UNPUBLISHED = re.compile(
     r"METHOD|FACTS|ARCHITECTURE|REAL_MODELS|STYLE\.md|README, |(?<!llama\.cpp )(?<!its )\bissue \d+"
 )
@@ -137,7 +139,7 @@ def test_a_missed_goal_is_missed() -> None:
 
 
 def test_pages_that_code_cites_exist() -> None:
-    for folder in ("configs", "models_onnx", "nodes", "runtime", "tools", "tests", "examples"):
+    for folder in CODE_FOLDERS:
         for path in (ROOT / folder).rglob("*.py"):
             for page, anchor in re.findall(r"(docs/\w+\.md)(?:#([\w-]+))?", path.read_text()):
                 assert (ROOT / page).exists(), f"{path}: {page}"
@@ -146,10 +148,23 @@ def test_pages_that_code_cites_exist() -> None:
                 assert not anchor or anchor in slugs, f"{path}: {page}#{anchor}"
 
 
+def test_files_that_code_and_model_cards_cite_exist() -> None:
+    paths = [path for folder in CODE_FOLDERS for path in sorted((ROOT / folder).rglob("*"))]
+    python_files = {path.name for path in (*paths, ROOT / "docs/generate.py") if path.suffix == ".py"}
+    missing = []
+    for path in (path for path in paths if path.suffix in (".py", ".md", ".toml", ".txt", ".sh")):
+        text = path.read_text()
+        cited = re.findall(rf"(?<![\w./-])((?:{'|'.join(CODE_FOLDERS)})/[\w/.-]*\w)", text)
+        missing += [f"{path}: {name}" for name in cited if name not in NOT_KEPT and not (ROOT / name).exists()]
+        names = re.findall(r"(?<![\w/.*-])(\w+\.py)\b", text)  # without a folder
+        missing += [f"{path}: {name}" for name in names if name not in python_files]
+    assert missing == []
+
+
 def test_code_cites_only_what_the_repository_holds() -> None:
     hits = [
         f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
-        for folder in ("configs", "models_onnx", "nodes", "runtime", "tools", "tests", "examples")
+        for folder in CODE_FOLDERS
         for path in sorted((ROOT / folder).rglob("*"))
         if path.suffix in (".py", ".md", ".toml", ".txt", ".sh") and path != Path(__file__)
         for number, line in enumerate(path.read_text().splitlines(), 1)

@@ -54,7 +54,7 @@ class CameraConfig(NodeConfig):
     settings: dict[str, Any] = Field(default_factory=dict)  # the source's own, documented in its module
 
 
-class Camera(Source):
+class CameraNode(Source):
     """Gives every frame of one source, in order, and then End."""
 
     config_type = CameraConfig
@@ -128,4 +128,4 @@ def detect_source(path: str) -> type[FrameSource]:
     return sources[fits[0]]
 
 
-NODE = Camera
+NODE = CameraNode

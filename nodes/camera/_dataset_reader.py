@@ -122,12 +122,12 @@ def read_pose(path: Path) -> F64:
 def read_pinhole(path: Path, size: int = 3) -> F64:
     """Read fx fy cx cy (4,) in px out of a file with a camera matrix of (size, size); raises SourceError."""
     matrix = read_numbers(path, (size, size), "a camera matrix")
-    focal_and_centre = matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    focal_and_center = matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
     pinhole = np.eye(size)
-    pinhole[[0, 1, 0, 1], [0, 1, 2, 2]] = focal_and_centre
+    pinhole[[0, 1, 0, 1], [0, 1, 2, 2]] = focal_and_center
     if not np.allclose(matrix, pinhole, equal_nan=True):
         raise SourceError(f"{path}: not a pinhole camera matrix without skew: {matrix.tolist()}")
-    return check_intrinsics(focal_and_centre, str(path))
+    return check_intrinsics(focal_and_center, str(path))
 
 
 def numbered_files(folder: Path, pattern: re.Pattern[str]) -> dict[int, Path]:
@@ -189,7 +189,7 @@ def check_intrinsics(intrinsics: F64, where: str) -> F64:
     return intrinsics
 
 
-def check_centre(intrinsics: F64, size: tuple[int, int], where: str) -> None:
+def check_center(intrinsics: F64, size: tuple[int, int], where: str) -> None:
     """Raise SourceError when the principal point lies outside an image of (height, width) px."""
     cx, cy = float(intrinsics[2]), float(intrinsics[3])
     if not (0 < cx < size[1] and 0 < cy < size[0]):

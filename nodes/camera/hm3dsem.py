@@ -80,7 +80,7 @@ class Hm3dSem(reader.NumberedFrames):
         where = "[nodes.camera.settings] intrinsics"
         focal = width / 2  # 90 degrees; pixels are square
         intrinsics = np.array(self._settings.intrinsics or [focal, focal, (width - 1) / 2, (height - 1) / 2])
-        reader.check_centre(reader.check_intrinsics(intrinsics, where), size, where)
+        reader.check_center(reader.check_intrinsics(intrinsics, where), size, where)
         return intrinsics
 
 

@@ -169,7 +169,7 @@ def to_frame(color: U8, depth: U16, matrix: F64, stamp_ns: int, frame_id: int, u
         )
     where = f"OAK camera, frame {frame_id}: intrinsics"
     intrinsics = reader.check_intrinsics(np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]), where)
-    reader.check_centre(intrinsics, depth.shape, where)
+    reader.check_center(intrinsics, depth.shape, where)
     return Frame(
         frame_id=frame_id,
         stamp_ns=stamp_ns,

@@ -88,7 +88,7 @@ class Replica(reader.NumberedFrames):
             size = f"{depth.shape[1]}x{depth.shape[0]}"
             raise SourceError(f"{self._colors[number]}: is {size}; {self._camera_file} says {camera.w}x{camera.h}")
         intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-        reader.check_centre(intrinsics, depth.shape, str(self._camera_file))
+        reader.check_center(intrinsics, depth.shape, str(self._camera_file))
         return color, depth, intrinsics
 
     def read_pose(self, number: int) -> F64:

@@ -80,8 +80,8 @@ class ScanNet(reader.NumberedFrames):
 
     def _check_sizes(self, color_path: Path, color_size: tuple[int, ...], depth_size: tuple[int, int]) -> None:
         height, width = color_size
-        reader.check_centre(self._depth_intrinsics, depth_size, str(self._depth_file))
-        reader.check_centre(self._color_intrinsics, (height, width), str(self._color_file))
+        reader.check_center(self._depth_intrinsics, depth_size, str(self._depth_file))
+        reader.check_center(self._color_intrinsics, (height, width), str(self._color_file))
         view = (self._color_intrinsics[0] / width) / (self._depth_intrinsics[0] / depth_size[1])
         if not 1 / MAX_VIEW_RATIO < view < MAX_VIEW_RATIO:
             raise SourceError(
@@ -100,8 +100,8 @@ def reproject_color(color: U8, from_intrinsics: F64, to_intrinsics: F64, size: t
     scale = np.array([width / color.shape[1], height / color.shape[0]])
     if (scale < 1).any():  # average first, or thin things of the larger image come and go
         color = np.asarray(cv2.resize(color, (width, height), interpolation=cv2.INTER_AREA))
-        centre = (from_intrinsics[2:] + 0.5) * scale - 0.5  # pixel centres are whole numbers
-        from_intrinsics = np.concatenate((from_intrinsics[:2] * scale, centre))
+        center = (from_intrinsics[2:] + 0.5) * scale - 0.5  # pixel centres are whole numbers
+        from_intrinsics = np.concatenate((from_intrinsics[:2] * scale, center))
     zoom = from_intrinsics[:2] / to_intrinsics[:2]
     shift = from_intrinsics[2:] - zoom * to_intrinsics[2:]
     source_from_result = np.column_stack((np.diag(zoom), shift))

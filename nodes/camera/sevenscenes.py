@@ -63,7 +63,7 @@ class SevenScenes(reader.NumberedFrames):
         """Images of a frame, depth in mm."""
         color_path = self._colors[number]
         color, depth = reader.read_color_and_depth(color_path, self._beside(color_path, "depth.png"))
-        reader.check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
+        reader.check_center(self._intrinsics, depth.shape, self._intrinsics_from)
         depth[depth == NO_READING] = 0
         return color, depth, self._intrinsics
 

@@ -80,7 +80,7 @@ class Tum(FrameSource):
         """Frames by colour time. Raises SourceError naming the file that is missing or damaged."""
         for frame_id, (stamp_ns, color_path, depth_path) in enumerate(self._pairs):
             color, depth = reader.read_color_and_depth(color_path, depth_path)
-            reader.check_centre(self._intrinsics, depth.shape, self._intrinsics_from)
+            reader.check_center(self._intrinsics, depth.shape, self._intrinsics_from)
             pose = (self._poses or {}).get(stamp_ns, reader.NO_POSE)
             yield Frame(
                 frame_id=frame_id,

@@ -28,10 +28,10 @@ from placegraph.runtime.vision.geometry import backproject, is_rigid, transform
 class FusionConfig(NodeConfig):
     """Settings of the map."""
 
-    map_every: int = Field(default=10, ge=1)  # keyframes between Maps, at least ...
-    map_share: float = Field(
-        default=0.05, ge=0
-    )  # ... and this share of all so far, so that their cost stays in proportion
+    # Between two Maps are at least so many keyframes, and at least this share of all keyframes so far: a Map of a long
+    # run costs more.
+    map_every_keyframes: int = Field(default=10, ge=1)
+    map_share: float = Field(default=0.05, ge=0)
     voxel_m: float = Field(default=0.05, gt=0)  # chosen by hand; also the cell of the room layer
     stride: int = Field(default=4, ge=1)  # every 4th pixel each way: 2 cm apart at 3 m, under half a voxel
     max_depth_m: float = Field(default=5.0, gt=0)
@@ -40,11 +40,11 @@ class FusionConfig(NodeConfig):
     free_height_m: float = Field(default=0.5, gt=0)
     free_clearance_m: float = Field(default=0.15, ge=0)  # rays stop short of the surface by more than the depth noise
     min_observations: int = Field(default=3, ge=1)  # ConceptGraphs; an object seen less often is not in the Map
-    # Of the keyframes that showed an object, those that must have recognised it. Of house 9002's 156 objects 18 have
-    # less, 17 of them wrong.
-    recognised_share: float = Field(default=0.5, ge=0, le=1)
-    # Of an object's strongest name, the mean over the views that recognised it. Scores are the detector's, so the
-    # dataflow's file sets the value.
+    # Minimum share of the keyframes that showed an object in which it was recognised. 18 of house 9002's 156 objects
+    # have less, and 17 of these are wrong.
+    recognized_share: float = Field(default=0.5, ge=0, le=1)
+    # Minimum score of an object's strongest name, as the mean over the views that recognised it. Detectors differ in
+    # their scores, so the dataflow file sets the value.
     min_score: float = Field(default=0.0, ge=0, le=1)
     lift: LiftConfig = LiftConfig()
     association: AssociationConfig = AssociationConfig()
@@ -53,7 +53,7 @@ class FusionConfig(NodeConfig):
 
 
 class FusionNode(Node):
-    """Publishes a Map every `map_every` keyframes, more rarely in a long run, and a final one.
+    """Publishes a Map every `map_every_keyframes` keyframes, more rarely in a long run, and a final one.
 
     With a pose graph, keyframes are fused at its corrected poses, and the map moves when it corrects earlier ones.
     """
@@ -78,7 +78,7 @@ class FusionNode(Node):
         self._latest: Message | None = None  # the keyframe whose frame id and stamp the next Map carries
         self._last: LastKeyframe | None = None
         self._revision = 0
-        self._next_map = config.map_every  # keyframes from the start to the next Map
+        self._next_map = config.map_every_keyframes  # keyframes from the start to the next Map
         self._ended = False
 
     def step(self, message: Message) -> Sequence[Message]:
@@ -152,7 +152,7 @@ class FusionNode(Node):
 
     def _is_stable(self, instance: ObjectInstance) -> bool:
         c = self.config
-        min_observations = max(c.min_observations, c.recognised_share * instance.times_visible)
+        min_observations = max(c.min_observations, c.recognized_share * instance.times_visible)
         return (
             instance.observations >= min_observations
             and max(instance.votes.values()) >= c.min_score * instance.observations
@@ -160,7 +160,7 @@ class FusionNode(Node):
 
     def _make_map(self, final: bool) -> Map:
         c = self.config
-        self._next_map = len(self._submaps) + max(c.map_every, round(c.map_share * len(self._submaps)))
+        self._next_map = len(self._submaps) + max(c.map_every_keyframes, round(c.map_share * len(self._submaps)))
         source = self._latest or self._last
         assert source is not None
         revision, self._revision = self._revision, self._revision + 1

@@ -31,16 +31,16 @@ class AssociationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
 
     reach_voxels: float = 1.5  # points this near each other count as shared
     same_cosine: float = 0.5  # BBQ; with WordLlama couch/sofa is .51, chair/table .18
-    overlap: float = 0.25  # of a view with a known object of a like name; HOV-SG's .75 duplicates objects
+    overlap: float = 0.25  # with a known object of a similar name; HOV-SG's .75 duplicates objects
     box_inside: float = 0.5  # share of the smaller box inside the larger, for two sides of one object
     box_overlap: float = 0.1  # ... which must also share this much of their points
-    unlike_overlap: float = 0.5  # in both directions, when the names differ
+    unlike_overlap: float = 0.5  # with an object of another name, in both directions
     merge_overlap: float = 0.5  # BBQ: .7
     merge_unlike_overlap: float = 0.6
     sides_m: float = 0.12  # two sides of a pole or a board share no point, but most of each is this near to the other
-    sides_share: float = 0.8  # of the one side; of the other, which may be seen in full, `overlap`
-    split_gap_m: float = 0.1  # between two masks of one view that both lie on one object
-    split_views: int = 3  # an object is split when so many more views show such a gap than do not
+    sides_share: float = 0.8  # of one side's points; for the other side, which may be seen in full, `overlap`
+    split_gap_m: float = 0.1  # minimum gap between two masks of one view that lie on one object, to count as two
+    split_views: int = 3  # an object is split when this many more views show such a gap than do not
     merge_every: int = 10  # keyframes; BBQ: 20
     prune_after: int = 20  # keyframes without a second view; ConceptGraphs drops what has fewer than 3 views
 

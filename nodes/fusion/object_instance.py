@@ -18,8 +18,8 @@ from placegraph.runtime.vision.clustering import main_clusters
 from placegraph.runtime.vision.geometry import bounding_box, yaw_box
 
 # All three were chosen by hand.
-TRIM_PERCENT = 0.5  # of the points, that a box may lose to strays at each end of each axis
-MIN_MASK_SHARE = 0.3  # of the views that saw a point and the object, those whose mask held the point
+TRIM_PERCENT = 0.5  # of the points are left out of a box at each end of each axis, as strays
+MIN_MASK_SHARE = 0.3  # a point is kept when it was in the mask in this share of the views that saw it
 MIN_CLUSTER_SHARE = 0.2  # of the largest cluster's size; smaller clusters are leaks of masks onto the background
 
 

@@ -18,11 +18,13 @@ class VisibilityConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     # Three standard deviations of an OAK-D: .09 px of disparity, focal length 460 px and baseline 7.5 cm give .0026 m
     # at 1 m, growing with the square of the depth.
     margin_per_m2: float = Field(default=0.008, ge=0)
-    around_px: int = Field(default=4, ge=0)  # no reading within so many pixels may be closer: keeps thin things
+    around_px: int = Field(default=4, ge=0)  # no reading within this many pixels may be closer: keeps thin things
     reach_m: float = Field(default=4.0, gt=0)  # beyond, the margin is larger than a chair
     views: int = Field(default=4, ge=1, le=255)  # keyframes that must see through; two may be taken from one place
-    visible_share: float = Field(default=0.25, ge=0, le=1)  # of an object's points, that a view must see or see through
-    through_share: float = Field(default=0.7, ge=0.5, le=1)  # of these, that it must see through
+    visible_share: float = Field(
+        default=0.25, ge=0, le=1
+    )  # minimum share of an object's points that a view sees or sees through
+    through_share: float = Field(default=0.7, ge=0.5, le=1)  # minimum share of these that it sees through
 
 
 class DepthVisibility:

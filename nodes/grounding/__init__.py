@@ -32,7 +32,7 @@ class GroundingConfig(NodeConfig):
     settings: GroundingSettings = GroundingSettings()  # the numbers of relations, names and scores
 
 
-class Grounding(Node):
+class GroundingNode(Node):
     """Keeps the newest graph and answers each question with exactly one Answer."""
 
     config_type = GroundingConfig
@@ -92,4 +92,4 @@ class Grounding(Node):
         )
 
 
-NODE = Grounding
+NODE = GroundingNode

@@ -95,19 +95,19 @@ def match_anchors(
     fits = evaluate(query)
     trust *= fits.trust
     if name in ("closest", "farthest"):
-        return _rank_by_distance(fits, weights, is_self, name, trust, viewpoints.settings.nearness.doubt_m)
+        return _rank_by_distance(fits, weights, is_self, name, trust, viewpoints.settings.nearness.uncertain_anchor_m)
     assert query.anchors is not None
     values = np.where(is_self, 0.0, fits.values)
     if name not in UNDAMPED and query.anchors.ids and any(query.anchors.ids):
         values = values * np.where(
-            in_different_rooms(targets, query.anchors) > 0, viewpoints.settings.nearness.other_room, 1.0
+            in_different_rooms(targets, query.anchors) > 0, viewpoints.settings.nearness.other_room_factor, 1.0
         )
     weighted = values * weights[None]
     best = weighted.argmax(axis=1) if weighted.size else np.zeros(len(targets), np.int64)
     scores = weighted.max(axis=1, initial=0.0)
     if first.count and len(anchors) == 1:
         matching = ((values >= HOLDS) & (weights[None] >= HOLDS)).sum(axis=1)
-        scores = scores * np.power(viewpoints.settings.scores.miscount, np.abs(matching - first.count))
+        scores = scores * np.power(viewpoints.settings.scores.miscount_factor, np.abs(matching - first.count))
     return TargetFits(scores, _sentences(fits, best, is_self, targets, name), 0.0, trust, fits.known)
 
 
@@ -118,10 +118,10 @@ def fits_without_anchor(query: RelationQuery) -> TargetFits:
 
 
 def _rank_by_distance(
-    fits: PairFits, weights: F64, is_self: Bool, name: str, trust: float, doubt_m: float
+    fits: PairFits, weights: F64, is_self: Bool, name: str, trust: float, uncertain_anchor_m: float
 ) -> TargetFits:
     """Closest and farthest by the distance to the nearest anchor; a less likely anchor counts as farther away."""
-    penalty_m = -doubt_m * np.log2(np.maximum(weights, 1e-3))[None]
+    penalty_m = -uncertain_anchor_m * np.log2(np.maximum(weights, 1e-3))[None]
     distances_m = np.where(is_self, np.inf, np.abs(fits.values) + penalty_m)
     best = distances_m.argmin(axis=1) if distances_m.size else np.zeros(len(distances_m), np.int64)
     nearest = distances_m.min(axis=1, initial=np.inf)

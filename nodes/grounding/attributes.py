@@ -131,7 +131,7 @@ def color_fit(node: GraphNode, color: str, settings: AppearanceSettings) -> floa
 def size_fit(boxes: Boxes, size: str, among: Bool, settings: AppearanceSettings) -> F64:
     """(n,) how well large, small, tall, short, long or narrow fits each, by its rank among the others."""
     if size in ("large", "small"):
-        values = log_size(boxes, settings.short_side)
+        values = log_size(boxes, settings.short_side_weight)
     elif size in ("tall", "short"):
         values = boxes.size[:, 2]
     else:

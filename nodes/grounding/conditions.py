@@ -76,7 +76,9 @@ class ConditionScorer:
         scored = self.score(place, self.boxes(matches), matches, place)
         rank_positions = sorted(range(len(matches)), key=lambda i: (-scored.scores[i], id_key(matches[i].node.id)))
         best = scored.scores[rank_positions[0]]
-        return [matches[i].node for i in rank_positions if scored.scores[i] >= self.settings.scores.same_place * best]
+        return [
+            matches[i].node for i in rank_positions if scored.scores[i] >= self.settings.scores.same_place_share * best
+        ]
 
     def score(self, thing: Thing, boxes: Boxes, matches: Sequence[NameMatch] | None, target: Thing) -> ScoredCandidates:
         """Apply all conditions of a thing to its candidates; ranks last: "the largest near the table" is near it.

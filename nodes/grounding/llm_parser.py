@@ -1,6 +1,6 @@
 """Parse a request into a program with the language model and its adapter, constrained by the request's grammar.
 
-The adapter is trained by tools/training/reader.py on exactly the prompts that are written here.
+The adapter is trained by tools/training/reader_training.py on exactly the prompts that are written here.
 """
 
 from __future__ import annotations

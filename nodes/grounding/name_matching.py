@@ -113,7 +113,7 @@ class NameMatcher:
         return [
             match
             for match in matches
-            if best >= self.settings.min_nearest_cosine and match.score >= best - self.settings.tie / 2
+            if best >= self.settings.min_nearest_cosine and match.score >= best - self.settings.tie_margin / 2
         ]
 
     def _cosine_similarity(self, noun: str, tag: str) -> float:
@@ -123,7 +123,7 @@ class NameMatcher:
         """The nodes whose score is within `tie` of the best, in the order given."""
         matches = self.matches(noun, nodes)
         best = max((match.score for match in matches), default=0.0)
-        return [match for match in matches if match.score >= best - self.settings.tie]
+        return [match for match in matches if match.score >= best - self.settings.tie_margin]
 
     def is_known(self, noun: str, nodes: Iterable[GraphNode]) -> bool:
         """Whether the noun names any of the nodes."""
@@ -142,32 +142,34 @@ class NameMatcher:
 def _word_similarity(noun: str, tag: str, settings: NameSettings) -> float:
     """Similarity 0..1 by the words alone, both in normal form; 0 when they have nothing in common."""
     if noun == tag or _one_word(noun) == _one_word(tag):
-        return settings.same
+        return settings.same_words_fit
     if tag.endswith(f" {noun}"):
-        return settings.kind  # an office chair is a chair
+        return settings.head_noun_fit  # an office chair is a chair
     if _are_synonyms(noun, tag):
-        return settings.synonym + settings.shared_word_bonus * noun.endswith(
+        return settings.synonym_fit + settings.shared_word_bonus * noun.endswith(
             f" {tag}"
         )  # of a duffel bag: a bag before a backpack
     if tag in hyponyms().get(noun, ()):
-        return settings.member  # a chair is a seat
+        return settings.superclass_fit  # a chair is a seat
     if is_misspelling(noun, tag):
-        return settings.misspelled
+        return settings.misspelled_fit
     if noun.endswith(f" {tag}"):
-        return settings.head  # a "wooden chair" may be tagged chair
+        return settings.other_modifier_fit  # a "wooden chair" may be tagged chair
     best_score = 0.0
     for noun_head in _heads(noun):
         for tag_head in _heads(tag):
             if (noun_head, tag_head) == (noun, tag):
                 continue
-            weight = (settings.head if noun_head != noun else 1.0) * (settings.kind if tag_head != tag else 1.0)
+            weight = (settings.other_modifier_fit if noun_head != noun else 1.0) * (
+                settings.head_noun_fit if tag_head != tag else 1.0
+            )
             if _are_synonyms(noun_head, tag_head) or (noun_head == tag_head and noun_head != noun and tag_head != tag):
                 # "leather couch" and "green sofa": less, because the words before the heads may contradict each other
-                best_score = max(best_score, weight * (settings.synonym if noun_head != tag_head else 0.9))
+                best_score = max(best_score, weight * (settings.synonym_fit if noun_head != tag_head else 0.9))
             elif tag_head in hyponyms().get(noun_head, ()):
-                best_score = max(best_score, weight * settings.member)
+                best_score = max(best_score, weight * settings.superclass_fit)
             elif is_misspelling(noun_head, tag_head):
-                best_score = max(best_score, weight * settings.misspelled)
+                best_score = max(best_score, weight * settings.misspelled_fit)
     return best_score
 
 

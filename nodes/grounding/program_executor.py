@@ -108,7 +108,7 @@ class ProgramExecutor:
         scores = scored.scores
         keys = [(not scored.holds[i], -scores[i], id_key(matches[i].node.id)) for i in range(len(matches))]
         listed = sorted(range(len(matches)), key=keys.__getitem__)
-        if scores.max() > self.settings.scores.much_better * scores[listed[0]]:
+        if scores.max() > self.settings.scores.much_better_ratio * scores[listed[0]]:
             listed = sorted(listed, key=lambda i: (-scores[i], keys[i]))
         for i in listed[:MAX_LISTED]:
             naming = [f"{scored.boxes.labels[i]} is called {matches[i].tag}"] if names_a_kind(target.noun) else []
@@ -123,7 +123,7 @@ class ProgramExecutor:
             # "what is under the bed?": without a name, only what really is there is an answer
             ranking.notes += best.evidence
             ranking.candidates.clear()
-        elif len(matches) > 1 and scores.max() - scores.min() < self.settings.scores.tie:
+        elif len(matches) > 1 and scores.max() - scores.min() < self.settings.scores.tie_margin:
             ranking.note("nothing that is said tells one thing from another")
             ranking.candidates.clear()
 
@@ -162,6 +162,6 @@ class ProgramExecutor:
                 conditions.ranking.note(f"nothing in the map is called {thing.noun}, so nobody looks from there")
                 continue
             self.viewpoints.requested = choices[condition.name](
-                self._nearest_to_asker(anchors.best(min_weight=self.settings.viewpoint.min_faced))
+                self._nearest_to_asker(anchors.best(min_weight=self.settings.viewpoint.min_faced_share))
             )
             conditions.clear_anchors()  # they were scored from another viewpoint

@@ -156,7 +156,7 @@ class Reasoner:
         if any(program.target.conditions_named("for")):
             program = self._by_purpose(program, scope)
         ranking = executor.rank(program, scope)
-        tied = ranking.tied(self._settings.scores.tie)
+        tied = ranking.tied(self._settings.scores.tie_margin)
         if len(tied) > 1:  # the lowest id stands first
             ranking.note(f"{len(tied)} candidates fit equally: {', '.join(candidate.node.id for candidate in tied)}")
         return ModeResult(program, ranking, executor, ranking.sure, reader, confidence)

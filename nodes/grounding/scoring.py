@@ -31,7 +31,7 @@ class ScoredCandidates:
     ) -> None:
         """`names` (n,) is how well each is named, 0..1; narrowed: the request says more than the noun."""
         self.boxes, self.nodes, self.settings = boxes, nodes, settings
-        steps = (settings.same_name, settings.similar_name, settings.related_name)
+        steps = (settings.same_name_margin, settings.similar_name_margin, settings.related_name_margin)
         self.scores = names.astype(float)
         self.sentences: list[Sentence] = []
         best = float(names.max()) if len(names) else 0.0
@@ -40,7 +40,7 @@ class ScoredCandidates:
         peers = next((group for group in groups if group.sum() > 1), groups[0]) if narrowed else groups[0]
         self.is_unique = bool(groups[0].sum() == 1)  # one thing alone bears the name
         self.peers: Bool = peers
-        self.scores = np.where(peers, self.scores, settings.off_name * self.scores)
+        self.scores = np.where(peers, self.scores, settings.worse_name_factor * self.scores)
         self.holds: Bool = groups[-1]
         self._rankable: Bool | None = None  # fixed by the first rank
 
@@ -78,18 +78,18 @@ class ScoredCandidates:
         if len(rows) < number and int(self.peers.sum()) >= number:
             # "the second" where only one holds: another condition was misread
             rows = np.flatnonzero(self.peers & np.isfinite(measure))
-        values = np.full(len(self), settings.outranked)
+        values = np.full(len(self), settings.outranked_rank)
         places = rank_positions(measure[rows])
         count = len(rows)
         reached = min(number, count)  # "the fifth" of three: a misread number, the last comes nearest
         if count:
             reached_value = float(measure[rows][places == reached][0])
             off = np.abs(measure[rows] - reached_value)
-            runners = settings.runner_up / np.maximum(np.abs(places - reached), 1) ** 0.5
-            values[rows] = np.where(places == reached, 1.0, np.where(off <= margin, settings.level, runners))
-            values[rows] *= 1.0 if count >= number else settings.runner_up
+            runners = settings.runner_up_rank / np.maximum(np.abs(places - reached), 1) ** 0.5
+            values[rows] = np.where(places == reached, 1.0, np.where(off <= margin, settings.level_rank, runners))
+            values[rows] *= 1.0 if count >= number else settings.runner_up_rank
         if negated:  # candidates outside the comparison must not gain by the negation
-            values[np.setdiff1d(np.arange(len(self)), rows)] = 1 - settings.outranked
+            values[np.setdiff1d(np.arange(len(self)), rows)] = 1 - settings.outranked_rank
         position_of_row = {int(row): int(k) for row, k in zip(rows, places, strict=True)}
         short = f"; there are only {count}, not {number}" if count < number else ""
 

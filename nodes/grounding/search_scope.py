@@ -102,7 +102,9 @@ def _by_room(
 
 def _is_thing(noun: str, graph: SceneGraph, names: NameMatcher) -> bool:
     """Whether an object has this name by its words; by embedding similarity alone a bathroom would be a toilet."""
-    return any(match.score >= names.settings.head for match in names.best_matches(noun, graph.layer("object")))
+    return any(
+        match.score >= names.settings.other_modifier_fit for match in names.best_matches(noun, graph.layer("object"))
+    )
 
 
 def _typical_objects(noun: str, names: NameMatcher) -> Sequence[str]:

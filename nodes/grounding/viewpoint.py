@@ -166,11 +166,11 @@ class ViewpointSelector:
         steps = np.where(np.abs(directions) > 0.3, edge / np.where(np.abs(directions) > 0.3, directions, 1), np.inf)
         free = steps.min(axis=1) - half
         is_long_faced = things.labels[j].name in LONG_FACED
-        broad = (long if is_long_faced else ~long) * (is_long_faced or ratio >= numbers.elongated)
-        if not broad.any() and (free > numbers.wall_m).all():
+        broad = (long if is_long_faced else ~long) * (is_long_faced or ratio >= numbers.min_broad_ratio)
+        if not broad.any() and (free > numbers.back_to_wall_m).all():
             return from_room / length if length > 0.05 else np.zeros(2)
         score = directions @ (from_room / length) if length > 0.05 else np.zeros(4)
-        score = score + 1.0 * (free <= numbers.wall_m) + 1.0 * broad
+        score = score + 1.0 * (free <= numbers.back_to_wall_m) + 1.0 * broad
         return np.asarray(directions[int(np.argmax(score))])
 
     def in_front_of(self, things: Boxes) -> Viewpoint:
@@ -188,7 +188,7 @@ class ViewpointSelector:
         viewpoints = [self.in_front_of(things.take([j])) for j in range(min(len(things), MAX_FACED))]
         directions = np.array([np.zeros(2) if v.forward is None else v.forward for v in viewpoints])
         return viewpoints[
-            int(np.argmax((directions @ directions.T > self.settings.viewpoint.same_direction).sum(axis=1)))
+            int(np.argmax((directions @ directions.T > self.settings.viewpoint.same_direction_cosine).sum(axis=1)))
         ]
 
     def with_back_to(self, things: Boxes) -> Viewpoint:

@@ -27,14 +27,14 @@ FOOTPRINT_LEVEL = 50  # of each object's footprint, summed
 EDGE_LEVEL = 255
 
 
-def birds_eye_image(objects: Sequence[Points], span: FloorSpan, band_high: float) -> tuple[U8, PlanGrid]:
+def birds_eye_image(objects: Sequence[Points], span: FloorSpan, band_high_share: float) -> tuple[U8, PlanGrid]:
     """Image (SIZE_PX, SIZE_PX, 3) of one room's objects, and where it lies in the world.
 
-    objects: points (N, 3) of each, metres, world frame; band_high: share of the floor's height above which points
+    objects: points (N, 3) of each, metres, world frame; band_high_share: share of the floor's height above which points
     are left out. Channels: a cell's highest point, its lowest point, and the objects' convex footprints with edges.
     """
-    top = min(band_high * (span.ceiling - span.low), FULL_M)
-    kept = [xyz[(xyz[:, 2] >= span.low - BELOW_M) & (xyz[:, 2] <= span.low + top)] for xyz in objects]
+    top = min(band_high_share * (span.ceiling_m - span.low_m), FULL_M)
+    kept = [xyz[(xyz[:, 2] >= span.low_m - BELOW_M) & (xyz[:, 2] <= span.low_m + top)] for xyz in objects]
     kept = [xyz for xyz in kept if len(xyz)]
     grid = _grid_around(kept)
     image = np.zeros((SIZE_PX, SIZE_PX, 3), np.uint8)
@@ -42,7 +42,7 @@ def birds_eye_image(objects: Sequence[Points], span: FloorSpan, band_high: float
         return image, grid
     points = np.concatenate(kept)
     rows, columns = grid.cells(points)
-    share = np.clip((points[:, 2] - span.low) / FULL_M, 0, 1)
+    share = np.clip((points[:, 2] - span.low_m) / FULL_M, 0, 1)
     levels = np.round(MIN_LEVEL + (255 - MIN_LEVEL) * share).astype(np.uint8)
     highest, lowest = np.zeros((2, SIZE_PX, SIZE_PX), np.uint8)
     np.maximum.at(highest, (rows, columns), levels)

@@ -25,34 +25,39 @@ class FloorConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     bin_m: float = 0.01  # paper, floor layer
     smooth_m: float = 0.02  # depth noise spreads a floor over some bins
     separation_m: float = 0.2  # paper, delta_f
-    keep_share: float = 0.2  # paper .9 (p_h); a user of HOV-SG needed .2 on partial scans
+    keep_share: float = 0.2  # of the largest layer's area, at least; the paper's .9 (p_h) loses floors of partial scans
     slab_m: float = 0.6  # DBSCAN eps: ceiling and next floor are one cluster, floor and table (.7) are not
     cell_m: float = 0.1  # plan cells that make up a layer's area
-    rise_share: float = 0.3  # of a layer's area, its prominence over the heights around it: walls have small peaks
+    # Minimum prominence of a layer over the heights around it, as a share of its area: the peaks of walls are small.
+    rise_share: float = 0.3
     storey_m: float = 2.0  # minimum height from a floor to its ceiling or the next floor
     ceiling_m: float = 2.5  # assumed where no ceiling is in view: a level camera at 1.4 m sees it from 5 m on only
     camera_min_m: float = 0.15  # a robot's sensor, or a person's hand, above its floor
     camera_max_m: float = 2.2
-    below_share: float = 0.1  # of the seen plan area; a layer with more than this well below it is no floor
-    upper_share: float = 0.25  # of a slab's stronger layer, that its upper one has if it is a floor and not beds
-    stood_share: float = 0.1  # of the path above the floors below, that stands on a layer if it is a floor
-    camera_share: float = 0.05  # of the path, that must be too high for the floors below before another is sought
+    # A layer is not the lowest floor when more than this share of the seen plan area has points well below it.
+    below_share: float = 0.1
+    # A slab's upper layer is no floor (but the tops of beds) below this share of the area of the slab's largest layer.
+    upper_share: float = 0.25
+    # Minimum share of the camera path above the lower floors that must lie over a layer for it to be a floor.
+    stood_share: float = 0.1
+    # Minimum share of the camera path that must be too high for the floors found so far before another is looked for.
+    camera_share: float = 0.05
 
 
 @dataclass(frozen=True)
 class FloorSpan:
     """Heights in metres, world frame: of a floor, of its ceiling or highest point, and of the zone of its points."""
 
-    low: float
-    high: float
-    zone_low: float
-    zone_high: float
-    expected_ceiling: float = -np.inf  # of a ceiling that was not seen
+    low_m: float
+    high_m: float
+    zone_low_m: float
+    zone_high_m: float
+    expected_ceiling_m: float = -np.inf  # where a ceiling is expected that was not seen
 
     @property
-    def ceiling(self) -> float:
+    def ceiling_m(self) -> float:
         """The seen ceiling, or the expected one, or the highest point above that."""
-        return max(self.high, self.expected_ceiling)
+        return max(self.high_m, self.expected_ceiling_m)
 
 
 @dataclass(frozen=True)
@@ -159,14 +164,15 @@ def _floor_above(slabs: list[list[_Layer]], min_m: float, cameras: F64, config: 
 
 def _spans(lows: list[float], slabs: list[list[_Layer]], z: F64, config: FloorConfig) -> list[FloorSpan]:
     layers = [layer for slab in slabs for layer in slab]
-    margin = config.separation_m / 2  # so far below a floor lies its own noise
+    margin = config.separation_m / 2  # points less than this below a floor are its noise
     top, z_min, z_max = float(np.percentile(z, 99.5)), float(z.min()), float(z.max())
     spans = []
     for i, low in enumerate(lows):
         last = i + 1 == len(lows)
         limit = top + margin if last else lows[i + 1] - margin
         above = [layer for layer in layers if low + config.storey_m <= layer.height <= limit]
-        # without a layer at storey height the points end the floor; of a lower one without the walls of its stairs
+        # Without a layer at storey height the highest points end the floor. A lower floor's highest 2 % are left out,
+        # as they may be the walls of its stairs.
         between = z[(z >= low) & (z <= limit)]
         seen = top if last else float(np.percentile(between, 98)) if len(between) else low
         high = max(above, key=lambda layer: layer.area).height if above else min(seen, limit)

@@ -69,7 +69,7 @@ class GraphBuilder:
             spans = find_floors(map_.object_points_world, map_.camera_positions_world, self._config.floors)
         points = map_.points_world if len(map_.points_world) else map_.object_points_world
         floor_ids = self._floor_ids.assign(
-            [("", height_outline(span.low, max(span.ceiling, span.low + 0.1))) for span in spans]
+            [("", height_outline(span.low_m, max(span.ceiling_m, span.low_m + 0.1))) for span in spans]
         )
         nodes: list[GraphNode] = []
         rooms: list[FloorRoom] = []
@@ -77,7 +77,7 @@ class GraphBuilder:
         plans: list[FloorPlan] = []
         for i, (span, floor_id) in enumerate(zip(spans, floor_ids, strict=True)):
             floor_points, free = _in_zone(points, span), _in_zone(map_.free_points_world, span)
-            key = digest(floor_points, free, map_.free_cell_m, span.low, span.high)
+            key = digest(floor_points, free, map_.free_cell_m, span.low_m, span.high_m)
             grid, areas, extent = self._find_rooms(key, floor_points, free, map_.free_cell_m, span)
             extents.append(extent)
             ids = self._room_ids.assign([(floor_id, area.outline) for area in areas])
@@ -143,7 +143,7 @@ class GraphBuilder:
         self, room: FloorRoom, members: list[int], objects: list[Points], digests: list[bytes]
     ) -> list[LocationArea]:
         return self._location_memo.get(
-            digest(room.span.low, room.span.ceiling, *(digests[i] for i in members)),
+            digest(room.span.low_m, room.span.ceiling_m, *(digests[i] for i in members)),
             lambda: find_locations([objects[i] for i in members], room.span, self._config.locations, self._detector),
         )
 
@@ -160,7 +160,7 @@ def _check(map_: Map) -> None:
 
 def _in_zone(xyz: Points, span: FloorSpan) -> Points:
     z = np.ascontiguousarray(xyz[:, 2])
-    return xyz[(z >= span.zone_low) & (z <= span.zone_high)]
+    return xyz[(z >= span.zone_low_m) & (z <= span.zone_high_m)]
 
 
 def _building_node(floors: list[_FloorExtent]) -> GraphNode:
@@ -172,7 +172,7 @@ def _building_node(floors: list[_FloorExtent]) -> GraphNode:
 
 
 def _place_node(node_id: str, parent: str, span: FloorSpan, outline: Points, tags: tuple[Tag, ...] = ()) -> GraphNode:
-    box = np.array([[*outline.min(axis=0), span.low], [*outline.max(axis=0), span.ceiling]])
+    box = np.array([[*outline.min(axis=0), span.low_m], [*outline.max(axis=0), span.ceiling_m]])
     return _node(node_id, parent, box, outline, tags=tags)
 
 

@@ -32,8 +32,8 @@ from placegraph.runtime.vision.geometry import convex_footprint
 class LocationConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """Parameters of the location layer. Where the paper states no value it was chosen by hand."""
 
-    band_low: float = 0.05  # paper, alpha_min: above the noise of the floor
-    band_high: float = 0.8  # paper, alpha_max: below lamps
+    band_low_share: float = 0.05  # paper, alpha_min: above the noise of the floor
+    band_high_share: float = 0.8  # paper, alpha_max: below lamps
     cell_m: float = 0.1  # points are thinned to cells of this size before they are clustered
     eps_m: float = 0.4  # paper, DBSCAN: a chair pulled out from its table
     min_cells: int = 4  # paper, DBSCAN
@@ -78,11 +78,11 @@ def _find_by_network(
     objects: Sequence[Points], span: FloorSpan, config: LocationConfig, detector: LocationDetector
 ) -> list[LocationArea]:
     """Each mask of the network, best first, takes the objects mostly inside it that no better one has taken."""
-    image, grid = birds_eye_image(objects, span, config.band_high)
+    image, grid = birds_eye_image(objects, span, config.band_high_share)
     if not image.any():
         return []
     detected = detector.locate(image)
-    top = span.low + config.band_high * (span.ceiling - span.low)
+    top = span.low_m + config.band_high_share * (span.ceiling_m - span.low_m)
     banded = [xyz[xyz[:, 2] <= top] for xyz in objects]
     free = {i for i, xyz in enumerate(banded) if len(xyz)}
     areas = []
@@ -99,13 +99,13 @@ def _find_by_network(
 
 def _outline_with_members(mask_outline: F64, members: list[Points], span: FloorSpan, config: LocationConfig) -> F64:
     """Convex outline (K, 2) of a mask's outline and of the members that stand on the floor."""
-    standing = [xyz[:, :2] for xyz in members if xyz[:, 2].min() <= span.low + config.stand_m]
+    standing = [xyz[:, :2] for xyz in members if xyz[:, 2].min() <= span.low_m + config.stand_m]
     return np.asarray(convex_footprint(np.concatenate([mask_outline, *standing])), float)
 
 
 def _find_by_clustering(objects: Sequence[Points], span: FloorSpan, config: LocationConfig) -> list[LocationArea]:
-    height = span.ceiling - span.low
-    low, high = span.low + config.band_low * height, span.low + config.band_high * height
+    height = span.ceiling_m - span.low_m
+    low, high = span.low_m + config.band_low_share * height, span.low_m + config.band_high_share * height
     banded = [xyz[(xyz[:, 2] >= low) & (xyz[:, 2] <= high)] for xyz in objects]
     owner = np.repeat(np.arange(len(objects)), [len(xyz) for xyz in banded])
     if not len(owner):

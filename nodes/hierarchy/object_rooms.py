@@ -33,7 +33,7 @@ def assign_rooms(objects: Sequence[Points], rooms: Sequence[FloorRoom]) -> list[
     for room in rooms:
         by_floor.setdefault(room.floor_id, []).append(room)
     floors = list(by_floor.values())
-    zones = np.array([(floor[0].span.zone_low, floor[0].span.zone_high) for floor in floors]).reshape(-1, 2)
+    zones = np.array([(floor[0].span.zone_low_m, floor[0].span.zone_high_m) for floor in floors]).reshape(-1, 2)
     labels = [_label_image(floor) for floor in floors]
     object_rooms = []
     for xyz in objects:

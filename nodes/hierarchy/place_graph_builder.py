@@ -49,7 +49,7 @@ class FloorPlan:
 
     def position(self, cell: tuple[int, int]) -> F64:
         """(3,) metres, world, of a cell (row, column) on the floor."""
-        return np.array([*self.grid.centers(*np.array(cell)), self.span.low])
+        return np.array([*self.grid.centers(*np.array(cell)), self.span.low_m])
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,12 +30,12 @@ class RoomConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     min_slice_m: float = 0.3  # a scan that shows less than this of the slice takes walls from lower down, ...
     partial_low_m: float = 1.0  # ... namely from here, above tables and the backs of chairs
     level_m: float = 0.1  # a wall counts by the levels of this height that it fills
-    wall_fill_m: float = 0.2  # of the slice; HOV-SG's .25 of the fullest cell excludes lintels
-    smooth_m: float = 0.1  # of the distance field; HOV-SG smooths over .5 m, which closes corridors
+    wall_fill_m: float = 0.2  # filled height that makes a wall; HOV-SG's .25 of the fullest cell excludes lintels
+    smooth_m: float = 0.1  # the distance field is smoothed over this; HOV-SG's .5 m closes corridors
     seed_min_m: float = 0.5  # HOV-SG: drop seeds under .5 m across
     door_m: float = 1.6  # openings up to this width separate rooms; best of 1.2, 1.4, 1.6 on 8 real maps (ipa)
     neck_share: float = 0.7  # ... if they are this much narrower than the smaller room
-    close_m: float = 0.3  # gaps in what was observed that are closed
+    close_m: float = 0.3  # half the width of gaps in what was observed that are closed
     room_min_m2: float = 1.0
     wall_min_m: float = 1.0  # shorter pieces are furniture and lamps; with less wall in all, the floor is one room
 
@@ -74,10 +74,10 @@ def room_areas(labels: I32, grid: PlanGrid, config: RoomConfig) -> list[RoomArea
 
 def wall_mask(points_world: Points, span: FloorSpan, grid: PlanGrid, config: RoomConfig) -> Bool:
     """Cells where the slice between furniture and ceiling is filled: walls, and the lintels of open doors."""
-    above = points_world[:, 2] - span.low
-    low, high = config.slice_low_m, span.high - span.low - config.slice_high_m
+    above = points_world[:, 2] - span.low_m
+    low, high = config.slice_low_m, span.high_m - span.low_m - config.slice_high_m
     if high - low < config.min_slice_m:
-        low, high = config.partial_low_m, max(span.high - span.low, config.partial_low_m + config.level_m)
+        low, high = config.partial_low_m, max(span.high_m - span.low_m, config.partial_low_m + config.level_m)
     tall = (above >= low) & (above <= high)
     points = points_world[tall]
     levels = np.floor((above[tall] - low) / config.level_m).astype(np.int64)

@@ -37,7 +37,7 @@ def standing_floors(
     z = np.asarray(positions_world[:, 2], float)
     standing = np.full(len(z), NO_FLOOR, np.int64)
     for number, span in enumerate(spans):
-        over = z - span.low
+        over = z - span.low_m
         possible = (over > floors.camera_min_m) & (over < floors.camera_max_m)
         if possible.any():
             standing[possible & (np.abs(over - np.median(over[possible])) <= config.stand_m)] = number
@@ -82,7 +82,7 @@ def _stairs_of_climb(
         path, floors = path[::-1], (floors[1], floors[0])
     ends = np.stack((path[0], path[-1]))
     half_way = path[np.argmin(np.abs(path[:, 2] - ends[:, 2].mean()))]
-    ends[:, 2] = [spans[number].low for number in floors]
+    ends[:, 2] = [spans[number].low_m for number in floors]
     # the camera may bend down on the way: the stairs themselves are at least as long as the straight line
     length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     length = max(length, float(np.linalg.norm(ends[1] - ends[0])))

@@ -30,19 +30,19 @@ class TraversabilityConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     # A column with less than this share of the fullest column within two cells is the noise of that wall. At .3, doors
     # of two simulated houses come out 4 and 7 cm wider, and .006 less of where the robot may stand is truly free.
     fringe_share: float = Field(default=0.3, ge=0, le=1)
-    flat_cells: int = Field(default=7, ge=1, le=9)  # of 3 x 3, that hold a voxel: an obstacle, too (a thin table top)
-    floor_band_m: float = Field(default=0.12, gt=0)  # points so near to the floor's height show the floor
-    close_m: float = Field(default=0.15, ge=0)  # gaps in the seen floor that are closed, half their width
-    blind_m: float = Field(default=1.0, ge=0)  # around the camera's path: what lies right below it is never seen
-    drop_m: float = Field(default=1.0, gt=0)  # ... unless points so far below the floor show the edge of a stair
-    wall_m: float = Field(default=0.5, gt=0)  # rooms grow so far into a passage to meet there
-    entry_m2: float = Field(default=0.1, gt=0)  # a connection leads to at least so much standing room on both sides
+    flat_cells: int = Field(default=7, ge=1, le=9)  # this many of 3 x 3 with a voxel: an obstacle, as a thin table top
+    floor_band_m: float = Field(default=0.12, gt=0)  # points this near to the floor's height are of the floor
+    close_m: float = Field(default=0.15, ge=0)  # half the width of gaps in the seen floor that are closed
+    blind_m: float = Field(default=1.0, ge=0)  # floor this near to the camera's path counts as seen ...
+    drop_m: float = Field(default=1.0, gt=0)  # ... unless points this far below it show the edge of a stair
+    wall_m: float = Field(default=0.5, gt=0)  # rooms grow this far into a passage to meet there
+    entry_m2: float = Field(default=0.1, gt=0)  # minimum standing room on both sides of a connection
     path_gap_m: float = Field(default=1.0, gt=0)  # camera positions further apart are no path
-    stand_m: float = Field(default=0.15, gt=0)  # the camera is that much off its usual height at most: under one step
+    stand_m: float = Field(default=0.15, gt=0)  # maximum difference from the camera's usual height: under a stair
     stairs_apart_m: float = Field(default=1.0, gt=0)  # climbs whose ends are nearer are one flight of stairs
     stairs_width_max_m: float = Field(default=3.0, gt=0)
-    margin_m: float = Field(default=0.1, ge=0)  # of the robot when it faces an object: two cells
-    reach_m: float = Field(default=1.0, gt=0)  # from the robot's centre to the object's footprint at most
+    margin_m: float = Field(default=0.1, ge=0)  # between the robot and the object that it faces: two cells
+    reach_m: float = Field(default=1.0, gt=0)  # maximum distance from the robot's centre to the object
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ def compute_traversability(
     drop_off_points_world: (Q, 3), see `drop_off_points`; path_segments_world: (K, 2, 3) of the camera's path on this
     floor. All metres, world frame; free_cell_m: size of the free cells in plan.
     """
-    above = points_world[:, 2] - span.low
+    above = points_world[:, 2] - span.low_m
     solid = (above > config.step_m) & (above < config.robot_height_m)
     obstacle_points = points_world[solid]
     obstacle = _obstacles(_count(obstacle_points, grid), config)
@@ -87,13 +87,13 @@ def compute_traversability(
     passable = ((floor & free) | crossed) & ~obstacle | path
     clearance = _clearance(passable, grid.cell_m)
     levels = _obstacle_levels(obstacle_points, above[solid], grid)
-    return TraversabilityMap(grid, span.low, passable, clearance, (clearance >= config.robot_radius_m) | path, levels)
+    return TraversabilityMap(grid, span.low_m, passable, clearance, (clearance >= config.robot_radius_m) | path, levels)
 
 
 def drop_off_points(points_world: Points, span: FloorSpan, config: TraversabilityConfig) -> Points:
     """Of all points (P, 3) those (Q, 3) below the floor that show the ground falling away."""
     z = points_world[:, 2]
-    return points_world[(z > span.low - config.drop_m) & (z < span.low - 2 * config.floor_band_m)]
+    return points_world[(z > span.low_m - config.drop_m) & (z < span.low_m - 2 * config.floor_band_m)]
 
 
 def _count(points: Points, grid: PlanGrid) -> I64:
@@ -129,7 +129,7 @@ def _path_cells(segments: F64, grid: PlanGrid) -> Bool:
 
 
 def _free_cells(points: Points, cell_m: float, grid: PlanGrid, span: FloorSpan, config: TraversabilityConfig) -> Bool:
-    above = points[:, 2] - span.low
+    above = points[:, 2] - span.low_m
     return grid.image(points[(above > 0) & (above < config.robot_height_m)], cell_m) > 0
 
 

@@ -40,12 +40,13 @@ class NamingConfig(NodeConfig):
     n_ctx: int = Field(N_CTX, ge=64)  # tokens
 
 
-class Naming(Node):
+class NamingNode(Node):
     """Names the rooms and locations of each graph."""
 
     config_type = NamingConfig
     inputs = (Graph,)
     outputs = (NamedGraph,)
+    restartable = True  # it only caches; a graph that a crash loses is followed by the next, which is complete
     config: NamingConfig
 
     def __init__(self, config: NamingConfig, context: Context) -> None:
@@ -99,4 +100,4 @@ class Naming(Node):
         return graph
 
 
-NODE = Naming
+NODE = NamingNode

@@ -155,7 +155,7 @@ class FeatureTracker:
             return PointMatches(xyz, uv, z)
         expected = project(xyz, view.intrinsics, guess)
         start = np.where(np.isfinite(expected), expected, uv).astype(np.float32) / np.float32(2)
-        before, after = _normalised_shading(last.gray), _normalised_shading(view.gray)
+        before, after = _normalized_shading(last.gray), _normalized_shading(view.gray)
         half_uv, is_tracked = _track_points(before, after, uv / np.float32(2), start, side // 2, self._config)
         view_uv = half_uv[is_tracked] * np.float32(2)
         return PointMatches(xyz[is_tracked], view_uv, inverse_depth_at(view.depth_m, view_uv))
@@ -218,7 +218,7 @@ def _track_points(
     return forward, is_forward & is_backward & is_inside & is_near
 
 
-def _normalised_shading(gray: U8) -> U8:
+def _normalized_shading(gray: U8) -> U8:
     """The image at half size without grain and without slow changes, divided by the contrast around each pixel.
 
     Otherwise a lens's vignette, which does not move, would dominate a moving bare wall.

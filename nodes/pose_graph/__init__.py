@@ -13,32 +13,37 @@ from pydantic import Field
 
 from placegraph.nodes.pose_graph.level_surfaces import LevelSurfaceConfig, up_from_level_surfaces
 from placegraph.nodes.pose_graph.loop_detector import Loop, LoopDetector, LoopDetectorConfig
-from placegraph.nodes.pose_graph.optimizer import Edge, UpMeasurement, optimise
+from placegraph.nodes.pose_graph.optimizer import Edge, UpMeasurement, optimize
 from placegraph.runtime.arrays import F64, I64
 from placegraph.runtime.messages import Correction, Keyframe, Message
 from placegraph.runtime.node import Context, Node, NodeConfig
 from placegraph.runtime.vision.geometry import inverse, nearest_rigid, rotation_angle_rad
 from placegraph.runtime.vision.registration import is_within
 
-MOVED_PER_WAIT = 40  # after moving so many keyframes, loops wait for one more keyframe: steps of a long run stay short
+# After an optimisation that may move n keyframes, the next n / 40 keyframes start no other: otherwise a long run would
+# spend its time on optimising. Chosen by hand.
+MOVED_PER_WAIT = 40
 
 
 class PoseGraphConfig(NodeConfig):
     """Standard deviations of the measurements, and when poses are optimised and published."""
 
-    # of a step between keyframes, chosen on the house walks; errors of a longer step add up as those of a random walk
+    # Errors of odometry from keyframe to keyframe, for a step of at most `step_m` and `step_rad`; chosen on the house
+    # walks. The error of a longer step grows with the square root of its length, as in a random walk.
     odometry_sigma_m: float = Field(default=0.004, gt=0)
     odometry_sigma_rad: float = Field(default=0.003, gt=0)
     step_m: float = Field(default=0.15, gt=0)
     step_rad: float = Field(default=0.15, gt=0)
-    # of a verified loop; the covariance of its registration is too small, as it takes errors as independent
+    # Errors of a verified loop. They are not those that its registration computes, which are too small because it takes
+    # the errors of all points as independent.
     loop_sigma_m: float = Field(default=0.015, gt=0)
     loop_sigma_rad: float = Field(default=0.008, gt=0)
-    # poses are optimised when a loop differs from them by this; from `keyframes_before_loop` before its start they move
+    # Poses are optimised when a loop differs from them by more than this. The keyframes that may move begin
+    # `keyframes_before_loop` before the first one of the loop.
     min_loop_error_m: float = Field(default=0.01, ge=0)
     min_loop_error_rad: float = Field(default=0.004, ge=0)
     keyframes_before_loop: int = Field(default=15, ge=0)
-    # a keyframe that moved and turned less than this keeps its place in the map
+    # A keyframe that moved and turned less than this keeps its place in the map.
     min_correction_m: float = Field(default=0.02, gt=0)
     min_correction_rad: float = Field(default=0.005, gt=0)
     loops: LoopDetectorConfig = LoopDetectorConfig()
@@ -62,7 +67,7 @@ class PoseGraphNode(Node):
         self._published_poses = np.zeros((0, 4, 4))  # as the map has them
         self._travelled_m = np.zeros(0)
         self._pending_loops: list[int] = []  # first keyframes of loops since the last optimisation
-        self._next_optimisation = 0  # number of the first keyframe that may start it
+        self._next_optimization = 0  # number of the first keyframe that may start it
         self._edges: list[Edge] = []
         self._ups: list[UpMeasurement] = []
 
@@ -74,11 +79,11 @@ class PoseGraphNode(Node):
         loops = self._measure(message)
         moved = np.zeros(0, np.int64)
         self._pending_loops += [loop.first for loop in loops if self._contradicts_poses(loop)]
-        if self._pending_loops and new >= self._next_optimisation:
+        if self._pending_loops and new >= self._next_optimization:
             fixed = min(self._pending_loops) - self.config.keyframes_before_loop
-            self._poses = optimise(self._poses, self._edges, self._ups, fixed)
+            self._poses = optimize(self._poses, self._edges, self._ups, fixed)
             moved, self._pending_loops = self._moved(), []
-            self._next_optimisation = new + (new - max(0, fixed)) // MOVED_PER_WAIT
+            self._next_optimization = new + (new - max(0, fixed)) // MOVED_PER_WAIT
         self._published_poses[moved] = self._poses[moved]
         self._published_poses[new] = self._poses[new]
         return [

@@ -18,7 +18,7 @@ class LevelSurfaceConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """When a view shows which way is up."""
 
     max_angle_rad: float = 0.12  # between the normal of a level surface and the expected up
-    min_share: float = Field(default=0.1, gt=0)  # of the known normals must be those of level surfaces
+    min_share: float = Field(default=0.1, gt=0)  # minimum share of the known normals that belong to level surfaces
     sigma_rad: float = Field(default=0.01, gt=0)  # of the mean of those normals
     iterations: int = 3
 

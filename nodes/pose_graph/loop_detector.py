@@ -25,22 +25,22 @@ LAYOUT_SIZE = (8, 6)  # cells of the colour layout, columns and rows
 class LoopDetectorConfig(BaseModel, frozen=True, strict=True, extra="forbid"):
     """Where to look for loops, and which to believe."""
 
-    # a keyframe that moved and turned less than this since the last remembered one is not remembered, or a robot that
-    # stands still for a night would fill the memory
+    # A keyframe that moved and turned less than this since the last remembered one is not remembered: a robot that
+    # stands still for a night must not fill the memory.
     min_motion_m: float = 0.03
     min_turn_rad: float = 0.03
     skip_newest: int = Field(default=3, ge=1)  # keyframes, which odometry has registered to each other already
     max_distance_m: float = 1.5  # between the positions of two views that can be matched
     drift_share: float = 0.01  # of the distance travelled since; added to max_distance_m
     max_angle_rad: float = 0.8  # between viewing directions
-    max_candidates: int = Field(default=4, ge=1)  # by their poses, for each keyframe
+    max_candidates: int = Field(default=4, ge=1)  # chosen by their poses, for each keyframe
     min_candidate_gap: int = 5  # keyframes between two candidates
-    # Another place may look the same, a few steps away. So a loop may not differ from the poses by more than odometry
-    # can be wrong by: these, plus a share of the distance travelled, in metres and in rad.
+    # A place a few steps away may look the same. So a loop is refused when it differs from the poses by more than the
+    # possible error of odometry: these values, plus a share of the distance travelled, in metres and in rad.
     max_deviation_m: float = 0.1
     max_deviation_rad: float = 0.05
     deviation_share: float = 0.05
-    max_layout_candidates: int = 1  # by the layout of colours, wherever they are
+    max_layout_candidates: int = 1  # chosen by the layout of colours, whatever their poses
     min_layout_correlation: float = 0.9
     features: FeatureConfig = FeatureConfig()
 
@@ -135,5 +135,5 @@ def _color_layout(color: U8) -> F32:
     """Unit vector of an image's coarse colours; without their mean, because brightness changes from view to view."""
     lab = cv2.cvtColor(color, cv2.COLOR_RGB2LAB)
     small = cv2.resize(lab, LAYOUT_SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
-    centred = (small - small.mean(axis=(0, 1))).ravel()
-    return np.asarray(centred / max(float(np.linalg.norm(centred)), 1e-6), np.float32)
+    centered = (small - small.mean(axis=(0, 1))).ravel()
+    return np.asarray(centered / max(float(np.linalg.norm(centered)), 1e-6), np.float32)

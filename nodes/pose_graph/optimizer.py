@@ -39,7 +39,7 @@ class UpMeasurement:
     sigma_rad: float
 
 
-def optimise(
+def optimize(
     poses: F64, edges: Sequence[Edge], ups: Sequence[UpMeasurement], fixed: int = 1, iterations: int = 10
 ) -> F64:
     """Poses (K, 4, 4) world_from_camera that fit all measurements best; the first `fixed` (at least one) stay.

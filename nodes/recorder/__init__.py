@@ -45,7 +45,7 @@ class RecorderConfig(NodeConfig):
     frames: bool = False  # keep every camera frame too, about 0.5 MB each at 640x480, so that all can be run again
 
 
-class Recorder(Node):
+class RecorderNode(Node):
     """Writes and draws its inputs; it has no outputs."""
 
     config_type: ClassVar[type[NodeConfig]] = RecorderConfig
@@ -102,4 +102,4 @@ class Recorder(Node):
             self._writer = None
 
 
-NODE = Recorder
+NODE = RecorderNode

@@ -112,8 +112,8 @@ class CreditWindow:
     def set_present(self, consumer: str, present: bool) -> None:
         """Note that a consumer died, or is back: then what it missed counts as confirmed.
 
-        The producer waits for a dead consumer, too: it is started again, and meanwhile the others must not pile up
-        what they match with its messages.
+        The producer waits for a dead consumer until it is started again. If the producer went on, nodes that join its
+        messages with the dead node's output would buffer without bound.
         """
         with self._changed:
             if present and consumer in self._absent:

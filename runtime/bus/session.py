@@ -119,7 +119,7 @@ class Bus:
         self._declarations.append(self._session.declare_queryable(self.config.key(*key), handler, complete=True))
 
     def ask(self, payload: bytes, timeout_s: float, *key: str) -> bytes:
-        """Send a request and wait for its reply; raises QueryError when there is none, or none in time."""
+        """Send a request and wait for its reply; raises QueryError when there is none in time, or an error reply."""
         name = self.config.key(*key)
         for reply in self._session.get(name, payload=payload, timeout=timeout_s):
             if reply.ok is not None:
@@ -127,7 +127,7 @@ class Bus:
             text = reply.err.payload.to_bytes() if reply.err is not None else b""
             if text == b"Timeout":
                 raise QueryError(f"{name}: no reply within {timeout_s:g} s")
-            return bytes(text)
+            raise QueryError(f"{name}: {text.decode(errors='replace') or 'an error without a text'}")
         raise QueryError(f"{name}: nobody answers at {self.config.endpoint}: no run with a grounding node, or it ended")
 
     def declare_alive(self, name: str) -> None:

@@ -75,23 +75,23 @@ def find_route(graph: SceneGraph, start: str | F64, goal: str) -> Route | None:
         previous[state] = came_from
         if not state[0]:
             return _route(graph, a, b, previous, length)
-        for neighbour, distance in _neighbours(graph, state, b):
-            if neighbour not in previous:
-                heapq.heappush(queue, (length + distance, neighbour, state))
+        for neighbor, distance in _neighbors(graph, state, b):
+            if neighbor not in previous:
+                heapq.heappush(queue, (length + distance, neighbor, state))
     return None
 
 
-def _neighbours(graph: SceneGraph, state: _State, goal: _Endpoint) -> list[tuple[_State, float]]:
+def _neighbors(graph: SceneGraph, state: _State, goal: _Endpoint) -> list[tuple[_State, float]]:
     """The states that can be reached directly from a state, and the metres to each."""
     connection_id, room = state
     connection = graph.connections[connection_id]
-    neighbours: list[tuple[_State, float]] = [((connection_id, connection.room_beyond(room)), connection.length_m)]
+    neighbors: list[tuple[_State, float]] = [((connection_id, connection.room_beyond(room)), connection.length_m)]
     for segment in graph.route_segments:
         if segment.room == room and connection_id in segment.ends and room not in segment.ends:
-            neighbours.append(((segment.ends[1 - segment.ends.index(connection_id)], room), segment.length_m))
+            neighbors.append(((segment.ends[1 - segment.ends.index(connection_id)], room), segment.length_m))
     if room == goal.room and connection_id in goal.distance_m:
-        neighbours.append((("", room), goal.distance_m[connection_id]))
-    return neighbours
+        neighbors.append((("", room), goal.distance_m[connection_id]))
+    return neighbors
 
 
 def _endpoint(graph: SceneGraph, place: str | F64) -> _Endpoint | None:

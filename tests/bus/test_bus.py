@@ -73,3 +73,14 @@ def test_questions_and_replies(bus_config) -> None:
         with pytest.raises(QueryError, match=r"no reply within 0\.3 s"):
             asker.ask(b"silent", 0.3, "ask")
         kept[0].reply(b"late")  # harmless: nobody waits any more
+
+
+def test_an_error_reply_is_raised(bus_config) -> None:
+    with Bus(bus_config, hub=True), Bus(bus_config) as server, Bus(bus_config) as client:
+        ready = threading.Event()
+        server.serve(lambda query: query._query.reply_err(b"no such map"), "ask")
+        server.declare_alive("server")
+        client.watch_alive(lambda name, alive: ready.set())
+        assert ready.wait(10)
+        with pytest.raises(QueryError, match="test/ask: no such map"):
+            client.ask(b"x", 5.0, "ask")

@@ -102,7 +102,7 @@ def test_live_it_is_not_waited_for_ever_for_a_keyframe_that_is_lost(
 def test_a_run_that_fails_keeps_what_it_mapped(tmp_path: Path, writable: bool) -> None:
     camera = {"source": "flat", "limit": 40, "settings": {"width": 64, "height": 48}}
     nodes = {"camera": camera, "pose": {"method": "given"}, "keyframe": {}, "instances": {"model": "drawn_scene"}}
-    dataflow = build(RunConfig(nodes=nodes | {"fusion": {"map_every": 1}, "hierarchy": {}}))
+    dataflow = build(RunConfig(nodes=nodes | {"fusion": {"map_every_keyframes": 1}, "hierarchy": {}}))
     collector, folder = MapCollector(dataflow), tmp_path / "map"
     assert _save_partial_map(collector, folder) == "" and not folder.exists()
     with Inline(dataflow, collector.add) as shell:

@@ -82,7 +82,7 @@ def test_a_node_that_dies_in_a_replay_ends_the_run_and_is_named(bus_config, tmp_
             wait_until(launcher.poll, "the death is noticed")
 
 
-def test_live_a_stateless_node_is_started_again_and_the_run_goes_on(bus_config, tmp_path, wait_until) -> None:
+def test_live_a_restartable_node_is_started_again_and_the_run_goes_on(bus_config, tmp_path, wait_until) -> None:
     segments: list[Message] = []
     with Launcher(flow(bus_config, tmp_path, limit=0, realtime=True), tmp_path) as launcher:
         launcher.observe(Segments, segments.append)
@@ -96,7 +96,7 @@ def test_live_a_stateless_node_is_started_again_and_the_run_goes_on(bus_config, 
         wait_until(lambda: (launcher.poll(), len(segments) > seen)[1], "segments after")
 
 
-def test_live_a_node_with_state_is_not_started_again(bus_config, tmp_path, wait_until) -> None:
+def test_live_a_node_that_is_not_restartable_ends_the_run(bus_config, tmp_path, wait_until) -> None:
     with Launcher(flow(bus_config, tmp_path, limit=0, realtime=True), tmp_path) as launcher:
         launcher.start()
         os.kill(launcher.pids()["pose"], signal.SIGKILL)

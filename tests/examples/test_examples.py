@@ -1,5 +1,7 @@
 """The programs in examples/, run as a user runs them; ask_over_zenoh.py is run by tests/bus/test_questions.py."""
 
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +66,52 @@ def test_an_object_list_is_asked(mapped: Path) -> None:
     assert lines[0] == "found other chair" and any("table" in line for line in lines[1:])
 
 
+def run_as_module(tmp_path: Path, name: str, package: str, code: str) -> list[str]:
+    """Lines printed by code for which the example is a module of a package, as if it had been copied there."""
+    shutil.copy(EXAMPLES / name, tmp_path)
+    code = f"import {package} as package\npackage.__path__.append({str(tmp_path)!r})\n{code}"
+    return subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=tmp_path
+    ).stdout.splitlines()
+
+
+def test_a_camera_of_ones_own_gives_sound_frames_until_the_limit(tmp_path: Path) -> None:
+    code = """
+from placegraph.nodes.camera import CameraConfig, NODE
+from placegraph.runtime.node import Context
+node = NODE(CameraConfig(source="my_camera", limit=3, settings={"width": 64, "height": 48}), Context())
+for message in node.messages():
+    message.check()
+    print(type(message).__name__, message.frame_id)
+print(node.is_lossless())
+"""
+    lines = run_as_module(tmp_path, "my_camera.py", "placegraph.nodes.camera", code)
+    assert lines == ["Frame 0", "Frame 1", "Frame 2", "End 2", "False"]
+
+
+def test_a_relation_of_ones_own_is_asked_for(tmp_path: Path) -> None:
+    row = re.search(r"^    (\"level\": .*),$", (EXAMPLES / "my_relation.py").read_text(), re.MULTILINE)
+    assert row
+    things = [
+        {"id": name, "tags": [name.split()[-1]], "center": [x, 0, z], "size": [0.3, 0.3, 0.3]}
+        for name, x, z in (("low picture", 0, 0.5), ("high picture", 2, 1.5), ("lamp", 1, 1.45))
+    ]
+    code = f"""
+import json
+from pathlib import Path
+from placegraph.nodes.grounding.program import CONDITIONS, ConditionForm
+from placegraph.runtime.query.request import make_question
+from placegraph.tools.query.offline_query import OfflineQuery
+CONDITIONS |= {{{row[1]}}}
+Path("room.json").write_text(json.dumps({{"objects": {things!r}}}))
+with OfflineQuery() as query:
+    reply = query.ask(Path("room.json"), make_question("the picture level with the lamp", mode="rules"))
+print(reply["object_id"], *reply["evidence"], sep="\\n")
+"""
+    lines = run_as_module(tmp_path, "my_relation.py", "placegraph.nodes.grounding.relations", code)
+    assert lines[0] == "high picture" and any("differ by 0.05 m" in line for line in lines[1:])
+
+
 def test_the_readme_names_every_program() -> None:
     text = (EXAMPLES / "README.md").read_text()
-    assert all(f"`{path.name} " in text for path in EXAMPLES.glob("*.py"))
+    assert all(re.search(rf"`{path.name}[ `]", text) for path in EXAMPLES.glob("*.py"))

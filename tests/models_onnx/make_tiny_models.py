@@ -96,16 +96,16 @@ def yolo_seg(path, rows, prototypes, classes=2, size=64):
     return _save(path, nodes, {"images": [1, 3, size, size]}, outputs, constants)
 
 
-def yolo_prompted(path, centres, features, slots="N", size=64):
-    """YOLO-World export: anchor i at `centres` (A, 4) scores a text by its product with `features` (A, D) row i."""
+def yolo_prompted(path, centers, features, slots="N", size=64):
+    """YOLO-World export: anchor i at `centers` (A, 4) scores a text by its product with `features` (A, D) row i."""
     features = np.asarray(features, np.float32)
     nodes, constants = _pixel(0, size // 2, size // 2)
     nodes += [
         helper.make_node("MatMul", ["txt_feats", "features"], ["likeness"]),
         helper.make_node("Mul", ["likeness", "pixel"], ["scores"]),
-        helper.make_node("Concat", ["centres", "scores"], ["output0"], axis=1),
+        helper.make_node("Concat", ["centers", "scores"], ["output0"], axis=1),
     ]
-    constants |= {"features": features.T, "centres": np.asarray(centres, np.float32).T[None]}
+    constants |= {"features": features.T, "centers": np.asarray(centers, np.float32).T[None]}
     rows = 4 + slots if isinstance(slots, int) else "rows"
     inputs = {"images": [1, 3, size, size], "txt_feats": [1, slots, features.shape[1]]}
     return _save(path, nodes, inputs, {"output0": [1, rows, len(features)]}, constants)
@@ -207,12 +207,12 @@ def quadrants(size=16):
     return prototypes
 
 
-def seg_row(centre, scores, **coefficients):
+def seg_row(center, scores, **coefficients):
     """One row of `yolo_seg`: cx cy w h, class scores, and coefficients by prototype as p0=..., p1=..."""
     values = np.zeros(32, np.float32)
     for name, value in coefficients.items():
         values[int(name[1:])] = value
-    return [*centre, *scores, *values.tolist()]
+    return [*center, *scores, *values.tolist()]
 
 
 def manifest_table(name, family, folder, files, labels=(), options=""):

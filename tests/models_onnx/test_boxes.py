@@ -13,8 +13,8 @@ def test_iou():
     np.testing.assert_array_equal(boxes.image_box_iou(np.zeros(4, F32), np.zeros((1, 4), F32)), [0])
 
 
-def test_from_centres():
-    np.testing.assert_array_equal(boxes.corners_from_centres(np.array([[5, 6, 4, 2]], F32)), [[3, 5, 7, 7]])
+def test_from_centers():
+    np.testing.assert_array_equal(boxes.corners_from_centers(np.array([[5, 6, 4, 2]], F32)), [[3, 5, 7, 7]])
 
 
 def test_suppression_is_within_a_class_and_in_order():

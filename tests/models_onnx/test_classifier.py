@@ -36,11 +36,11 @@ def test_the_floor_and_the_count(build, red):
     assert build(min_score=0.99).tag(red()).names == ()
 
 
-def test_channels_and_normalisation(build, red):
+def test_channels_and_normalization(build, red):
     blue = red()[:, :, ::-1].copy()
     assert build(label_offset=1).tag(blue).names[0] == "sea blue"
-    centred = build(mean=[127.5] * 3, std=[127.5] * 3, min_score=0.0).tag(red())
-    assert centred.scores[0] == pytest.approx(softmax(4, 2, -5, 1)[0], abs=1e-6)
+    centered = build(mean=[127.5] * 3, std=[127.5] * 3, min_score=0.0).tag(red())
+    assert centered.scores[0] == pytest.approx(softmax(4, 2, -5, 1)[0], abs=1e-6)
 
 
 def test_probabilities():

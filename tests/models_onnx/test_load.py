@@ -25,8 +25,10 @@ def test_an_unknown_family_or_name_is_an_error(tiny, tmp_path):
     tiny.write_models(tmp_path)
     path = tmp_path / "manifest.toml"
     path.write_text(path.read_text().replace('"classifier"', '"clasifier"'))
-    with pytest.raises(ConfigError, match="no model family named 'clasifier'"):
+    with pytest.raises(ConfigError, match="no model family named 'clasifier'; there are: ") as error:
         load("tiny_tags", [tmp_path])
+    families = str(error.value).rpartition(": ")[2].split(", ")
+    assert {"classifier", "sam", "yolox"} < set(families) and not {"boxes", "load", "session"} & set(families)
     with pytest.raises(ModelError, match="no weights named 'tiny'"):
         load("tiny", [tmp_path])
 

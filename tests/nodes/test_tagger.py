@@ -38,11 +38,11 @@ def test_a_keyframe_gives_its_tags(start):
     np.testing.assert_allclose(tags.scores, [0.9525], atol=1e-3)
 
 
-def test_min_score_and_max_objects(start):
-    grey = keyframe((0, 0, 0))  # three logits of 0
-    assert start(model="tiny_tags").step(grey)[0].names == ("red", "grey", "blue")
-    assert start(model="tiny_tags", max_objects=2).step(grey)[0].names == ("red", "grey")
-    (none,) = start(model="tiny_tags", min_score=0.5).step(grey)
+def test_min_score_and_max_tags(start):
+    gray = keyframe((0, 0, 0))  # three logits of 0
+    assert start(model="tiny_tags").step(gray)[0].names == ("red", "grey", "blue")
+    assert start(model="tiny_tags", max_tags=2).step(gray)[0].names == ("red", "grey")
+    (none,) = start(model="tiny_tags", min_score=0.5).step(gray)
     none.check()
     assert none.names == ()
 

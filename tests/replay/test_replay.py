@@ -20,7 +20,7 @@ CHANGED: dict[str, dict[str, Any]] = {
     "pose": {"rgbd": {"track": {"window_px": 15}}},
     "keyframe": {"translation_m": 0.16, "rotation_rad": 0.16},
     "instances": {"max_objects": 1},
-    "tagger": {"max_objects": 1},
+    "tagger": {"max_tags": 1},
     "detector": {"max_objects": 1},
     "segmenter": {"max_objects": 1},
     "pose_graph": {"loop_sigma_m": 0.1, "loop_sigma_rad": 0.1},

@@ -15,7 +15,7 @@ from placegraph.tools.perceive import WIDTH_PX, draw, perceive, run_networks, sh
 FLOW = '[nodes.camera]\n\n[nodes.instances]\nmodel = "drawn_scene"\n'
 
 
-def test_what_is_seen_is_coloured_in_the_picture() -> None:
+def test_what_is_seen_is_colored_in_the_picture() -> None:
     frame = next(iter(Flat(Path(), {"width": 160, "height": 120}).frames()))
     node = build_node("instances", {"model": "drawn_scene"}, Context())
     node.start()

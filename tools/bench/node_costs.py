@@ -147,7 +147,7 @@ def pose_cost() -> Cost:
 def fusion_costs() -> list[Cost]:
     """A step of fusion after the whole walk against early in it, for the same views: how costs grow with the map."""
     perceive = build_node("instances", {"model": "drawn_scene"}, Context())
-    fusion = build_node("fusion", {"map_every": MAP_EVERY}, Context())
+    fusion = build_node("fusion", {"map_every_keyframes": MAP_EVERY}, Context())
     walk = drawn_keyframes(FUSION_KEYFRAMES, 240, 180)
     start = walk[: FUSION_KEYFRAMES // 4]
     perceive.start()

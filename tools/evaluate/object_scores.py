@@ -27,7 +27,7 @@ from placegraph.tools.evaluate.place_overlap import ratio
 MIN_IOU = 0.25
 STRICT_IOU = 0.5
 MAX_THIN_M = 0.12  # the smallest extent of a thin object; chosen by hand, as are the next two
-MAX_CENTRE_DISTANCE_M = 0.25
+MAX_CENTER_DISTANCE_M = 0.25
 MIN_INSIDE = 0.5
 TOP_K = (1, 3, 5, 10)
 SAME_SIMILARITY = 1e-6  # similarities that differ by less count as equal
@@ -103,7 +103,7 @@ def compare_boxes(
 def fits(boxes: BoxComparison, true_boxes: F64) -> Bool:
     """(map, true) which map objects fit which true boxes (T, 2, 3)."""
     thin = (true_boxes[:, 1] - true_boxes[:, 0]).min(axis=1) < MAX_THIN_M
-    near = thin[None] & (boxes.distance_m < MAX_CENTRE_DISTANCE_M)
+    near = thin[None] & (boxes.distance_m < MAX_CENTER_DISTANCE_M)
     return np.asarray(boxes.same_class & ((boxes.iou >= MIN_IOU) | near))
 
 

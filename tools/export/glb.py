@@ -56,8 +56,8 @@ def _fence(place: GraphNode, height: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _placed(thing: GraphNode) -> tuple[np.ndarray, np.ndarray]:
     """Size (3,) and pose (4, 4) of an object's box, turned about z."""
-    centre, size, yaw = thing.turned_box[:3], thing.turned_box[3:6], thing.turned_box[6]
+    center, size, yaw = thing.turned_box[:3], thing.turned_box[3:6], thing.turned_box[6]
     pose = np.eye(4)
-    pose[:3, 3] = centre
+    pose[:3, 3] = center
     pose[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     return np.array(size), pose

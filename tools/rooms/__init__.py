@@ -129,8 +129,8 @@ def _write_floors(source: Path, out: Path, resolution: float | None) -> list[dic
         file = out if len(floors) == 1 else out.with_name(f"{out.stem}-{number}{out.suffix}")
         row = {
             "floor": number,
-            "low_m": round(floor.span.low, 3),
-            "high_m": round(floor.span.ceiling, 3),
+            "low_m": round(floor.span.low_m, 3),
+            "high_m": round(floor.span.ceiling_m, 3),
             "labels": str(file),
             "origin_m": np.round(floor.grid.origin, 3).tolist(),  # of the image's lower left corner
             "cell_m": floor.grid.cell_m,

@@ -74,7 +74,7 @@ def floors_of_cloud(xyz: F64, cell_m: float) -> list[FloorRooms]:
         ]
     floors = []
     for span in find_floors(xyz, eyes, floor_config):
-        points = xyz[(xyz[:, 2] >= span.zone_low) & (xyz[:, 2] <= span.zone_high)]
+        points = xyz[(xyz[:, 2] >= span.zone_low_m) & (xyz[:, 2] <= span.zone_high_m)]
         floors.append(FloorRooms(span, *find_rooms(points, no_free_space, cell_m, span, config)))
     return floors
 

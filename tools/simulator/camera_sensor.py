@@ -157,8 +157,8 @@ def _unmatched_pixels(
 
 def _textureless(color: U8) -> F32:
     """(H, W) 1 where the image has no detail to match, 0 from a contrast of about 24 levels around the pixel."""
-    grey = cv2.blur(color[..., 1], (3, 3))
-    contrast = cv2.blur(cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)), (9, 9))
+    gray = cv2.blur(color[..., 1], (3, 3))
+    contrast = cv2.blur(cv2.morphologyEx(gray, cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)), (9, 9))
     return np.asarray(np.clip(1 - (contrast.astype(np.float32) - 5) * np.float32(1 / 18), 0, 1), np.float32)
 
 

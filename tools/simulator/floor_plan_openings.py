@@ -48,15 +48,15 @@ class FloorOpenings:
     leaves: list[DoorLeaf] = field(default_factory=list)
 
     def shared_spans(
-        self, room: int, neighbour: int, margin_m: float = 0.0
+        self, room: int, neighbor: int, margin_m: float = 0.0
     ) -> list[tuple[float, float, CellSide, CellSide]]:
         """Free spans of the walls that two rooms share, with both sides, the longest first."""
         spans = []
         for side in self._sides(room):
-            for back in self._sides(neighbour):
+            for back in self._sides(neighbor):
                 if back.line == side.line and back.inward == -side.inward:
                     for face in side.stretches:
-                        if face.behind == neighbour:
+                        if face.behind == neighbor:
                             ends = (max(face.start_m, back.start_m), min(face.end_m, back.end_m))
                             spans += [(a, b, side, back) for a, b in self.free_spans(ends, (side, back), margin_m)]
         return sorted(spans, key=lambda span: span[0] - span[1])
@@ -117,11 +117,11 @@ def connect_rooms(random: np.random.Generator, openings: FloorOpenings) -> bool:
 
 
 def _cut_opening(
-    random: np.random.Generator, openings: FloorOpenings, room: int, neighbour: int, archway: float
+    random: np.random.Generator, openings: FloorOpenings, room: int, neighbor: int, archway: float
 ) -> bool:
     """Cuts a door or, with a probability, an archway between two rooms; False when they share too little wall."""
-    rooms = (min(room, neighbour), max(room, neighbour))
-    for low, high, side, back in openings.shared_spans(room, neighbour):
+    rooms = (min(room, neighbor), max(room, neighbor))
+    for low, high, side, back in openings.shared_spans(room, neighbor):
         length = high - low - 2 * JAMB_M
         if length >= 1.4 and random.random() < archway:
             width = random.uniform(1.4, min(2.6, length))
@@ -135,7 +135,7 @@ def _cut_opening(
             start = _door_start(random, (low, high), width, side)
             openings.add(side, WallOpening("door", start, start + width, 0.0, DOOR_HIGH_M, rooms))
             if random.random() < 0.85:
-                order = (side, back) if openings.types[neighbour] in HALLS or random.random() < 0.5 else (back, side)
+                order = (side, back) if openings.types[neighbor] in HALLS or random.random() < 0.5 else (back, side)
                 openings.doors.append((start, start + width, order[0]))
             return True
     return False

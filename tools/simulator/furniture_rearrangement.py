@@ -87,11 +87,11 @@ def _fits(piece: PlacedItem, polygon: F64, standing: Sequence[PlacedItem]) -> bo
     if not bool(np.all(points_in_polygon(polygon, wide))):
         return False
     box = piece.box
-    for neighbour in standing:
-        apart = neighbour.box[0, 2] >= box[1, 2] or box[0, 2] >= neighbour.box[1, 2]
+    for neighbor in standing:
+        apart = neighbor.box[0, 2] >= box[1, 2] or box[0, 2] >= neighbor.box[1, 2]
         if (
             not apart
-            and cv2.intersectConvexConvex(wide.astype(np.float32), neighbour.footprint.astype(np.float32))[0] > 0
+            and cv2.intersectConvexConvex(wide.astype(np.float32), neighbor.footprint.astype(np.float32))[0] > 0
         ):
             return False
     return True

@@ -87,10 +87,10 @@ def _smooth_normals(part: Part) -> F64:
     start, count = np.searchsorted(flat[order], flat), np.bincount(flat, minlength=flat.max() + 1)[flat]
     corner = np.repeat(np.arange(len(flat)), count)
     within = np.arange(len(corner)) - np.repeat(np.cumsum(count) - count, count)
-    neighbour = order[start[corner] + within]
-    own_normal, neighbour_normal = normal[corner // 3], normal[neighbour // 3]
-    neighbour_normal = neighbour_normal * (np.einsum("ij,ij->i", own_normal, neighbour_normal) > _SMOOTH)[:, None]
-    total: F64 = np.stack([np.bincount(corner, neighbour_normal[:, k], len(flat)) for k in range(3)], axis=1).astype(
+    neighbor = order[start[corner] + within]
+    own_normal, neighbor_normal = normal[corner // 3], normal[neighbor // 3]
+    neighbor_normal = neighbor_normal * (np.einsum("ij,ij->i", own_normal, neighbor_normal) > _SMOOTH)[:, None]
+    total: F64 = np.stack([np.bincount(corner, neighbor_normal[:, k], len(flat)) for k in range(3)], axis=1).astype(
         np.float64
     )
     total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)

@@ -62,7 +62,7 @@ class SupportSurface:
 class Item:
     """One designed object in its own frame."""
 
-    name: str  # a class of classes.py
+    name: str  # a class of object_classes.py
     parts: tuple[Part, ...]
     color_name: str = ""  # the word a person would use for its main colour; "" when it has none
     surfaces: tuple[SupportSurface, ...] = ()

@@ -76,7 +76,7 @@ def _weights_by_module(file: Path) -> dict[str, F32]:
     plain = {weights.name: numpy_helper.to_array(weights) for weights in graph.initializer}
     for node in graph.node:
         if node.op_type == "DequantizeLinear" and node.input[0] in plain:
-            plain[node.output[0]] = _dequantised(*(plain[name] for name in node.input))
+            plain[node.output[0]] = _dequantized(*(plain[name] for name in node.input))
     by_module = {name: weights for name, weights in plain.items() if weights.dtype == np.float32}
     for node in graph.node:
         if node.op_type == "Conv":
@@ -87,7 +87,7 @@ def _weights_by_module(file: Path) -> dict[str, F32]:
     return by_module
 
 
-def _dequantised(values: NDArray[np.int8], scale: F32, zero: NDArray[np.int8]) -> F32:
+def _dequantized(values: NDArray[np.int8], scale: F32, zero: NDArray[np.int8]) -> F32:
     by_channel = (-1,) + (1,) * (values.ndim - 1)
     off = values.astype(np.float32) - zero.astype(np.float32).reshape(by_channel if zero.size > 1 else ())
     return np.asarray(off * scale.reshape(by_channel if scale.size > 1 else ()), np.float32)

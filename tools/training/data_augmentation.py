@@ -99,14 +99,14 @@ class Augmentation:
         move = self._affine(shard.color.shape[2], shard.color.shape[1])
         size = (self._width, self._height)
         # boxes count from the edge of a pixel, OpenCV from its middle
-        centred = move.copy()
-        centred[:, 2] += 0.5 * (np.diag(move[:, :2]) - 1)
+        centered = move.copy()
+        centered[:, 2] += 0.5 * (np.diag(move[:, :2]) - 1)
         fill = (FILL,) * 3
-        color = np.asarray(cv2.warpAffine(shard.color[k], centred, size, borderValue=fill), np.uint8)
-        instance = np.asarray(cv2.warpAffine(shard.instance[k], centred, size, flags=cv2.INTER_NEAREST), np.uint16)
+        color = np.asarray(cv2.warpAffine(shard.color[k], centered, size, borderValue=fill), np.uint8)
+        instance = np.asarray(cv2.warpAffine(shard.instance[k], centered, size, flags=cv2.INTER_NEAREST), np.uint16)
         depth = np.zeros((0, 0), np.float32)
         if self._with_depth:
-            depth = np.asarray(cv2.warpAffine(shard.depth[k], centred, size, flags=cv2.INTER_NEAREST), np.float32)
+            depth = np.asarray(cv2.warpAffine(shard.depth[k], centered, size, flags=cv2.INTER_NEAREST), np.float32)
             depth /= np.float32(1000)
         boxes, classes, counts, ids = self._place(shard.boxes[k], move)
         cells = shard.shown[instance[4::8, 4::8]].ravel()

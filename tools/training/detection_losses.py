@@ -63,9 +63,9 @@ class AnchorLosses:
 
     def __init__(self, distances: Tensor, logits: Tensor, height: int, width: int) -> None:
         """distances: (B, 4, A) raw; logits: (B, N, A) of N words."""
-        self.centres, strides = anchors(height, width)
+        self.centers, strides = anchors(height, width)
         reach = functional.softplus(distances) * strides
-        self.boxes = torch.cat((self.centres.T - reach[:, :2], self.centres.T + reach[:, 2:]), 1).transpose(1, 2)
+        self.boxes = torch.cat((self.centers.T - reach[:, :2], self.centers.T + reach[:, 2:]), 1).transpose(1, 2)
         self.logits, self.scores = logits, torch.sigmoid(logits.detach())
         self.target_scores, self.weight = torch.zeros_like(self.scores), torch.ones_like(self.scores)
         self.box_loss, self.total = torch.zeros(()), torch.zeros(())
@@ -74,7 +74,7 @@ class AnchorLosses:
         """Adds image k with boxes (M, 4) of prompts (M,); returns assigned anchors, their boxes and quality (K,)."""
         if not len(boxes):
             return prompts, prompts, torch.zeros(0)
-        owner, quality = assign_anchors(self.boxes[k].detach(), self.scores[k], boxes, prompts, self.centres)
+        owner, quality = assign_anchors(self.boxes[k].detach(), self.scores[k], boxes, prompts, self.centers)
         assigned = torch.nonzero(owner >= 0)[:, 0]
         owner, quality = owner[assigned], quality[assigned]
         self.target_scores[k, prompts[owner], assigned] = quality
@@ -98,7 +98,7 @@ def losses(
     distances, logits, dense = (part.float() for part in outputs)
     anchor_losses = AnchorLosses(distances, logits, height, width)
     for k, (boxes, prompts, counts) in enumerate(zip(targets.boxes, targets.prompts, targets.counts, strict=True)):
-        _ignore_anchors(anchor_losses.weight[k], boxes[~counts], prompts[~counts], anchor_losses.centres)
+        _ignore_anchors(anchor_losses.weight[k], boxes[~counts], prompts[~counts], anchor_losses.centers)
         anchor_losses.add(k, boxes[counts], prompts[counts])
     box, word, total = anchor_losses.sums()
     return {
@@ -110,16 +110,16 @@ def losses(
 
 
 def assign_anchors(
-    predicted_boxes: Tensor, scores: Tensor, boxes: Tensor, prompts: Tensor, centres: Tensor
+    predicted_boxes: Tensor, scores: Tensor, boxes: Tensor, prompts: Tensor, centers: Tensor
 ) -> tuple[Tensor, Tensor]:
     """The box assigned to each anchor (A,), -1 for none, and the target score (A,).
 
     predicted_boxes: (A, 4) px; scores: (N, A); boxes: (M, 4); prompts: (M,); centres: (A, 2).
     """
     overlap = iou(boxes, predicted_boxes)  # (M, A)
-    inside = (centres[None] > boxes[:, None, :2]).all(-1) & (centres[None] < boxes[:, None, 2:]).all(-1)
+    inside = (centers[None] > boxes[:, None, :2]).all(-1) & (centers[None] < boxes[:, None, 2:]).all(-1)
     # an object smaller than a cell may contain no centre: the nearest anchors are used
-    off = torch.cdist((boxes[:, :2] + boxes[:, 2:]) / 2, centres)
+    off = torch.cdist((boxes[:, :2] + boxes[:, 2:]) / 2, centers)
     inside |= off <= torch.sort(off, dim=1)[0][:, 2:3]
     metric = scores[prompts] ** SCORE_POWER * overlap**IOU_POWER * inside + 1e-9 * inside
     best = torch.topk(metric, TOP, dim=1)
@@ -137,10 +137,10 @@ def assign_anchors(
     return owner, quality
 
 
-def _ignore_anchors(weight: Tensor, boxes: Tensor, prompts: Tensor, centres: Tensor) -> None:
+def _ignore_anchors(weight: Tensor, boxes: Tensor, prompts: Tensor, centers: Tensor) -> None:
     """Anchors inside an object that is too small or cut off get no loss for its word."""
     for box, prompt in zip(boxes, prompts, strict=True):
-        inside = ((centres > box[:2] - 8) & (centres < box[2:] + 8)).all(-1)
+        inside = ((centers > box[:2] - 8) & (centers < box[2:] + 8)).all(-1)
         weight[prompt, inside] = 0.0
 
 

@@ -11,7 +11,7 @@ import torch
 from placegraph.nodes.hierarchy.birds_eye_view import SIZE_PX
 from placegraph.tools.training.location_network import LocationExport, LocationNetwork
 from placegraph.tools.training.location_training import LocationSamples
-from placegraph.tools.training.onnx_export import Feeds, export_onnx, image_feed, quantise
+from placegraph.tools.training.onnx_export import Feeds, export_onnx, image_feed, quantize
 from placegraph.tools.training.training_loop import read_average
 
 NAME = "house_locations"
@@ -36,7 +36,7 @@ def export_locations(checkpoint: Path, data: Path, folder: Path) -> tuple[Path, 
         ["output0", "output1"],
         folder / "float" / f"{NAME}.onnx",
     )
-    return float_file, quantise(float_file, folder / f"{NAME}.onnx", _feeds(data), KEEP_FLOAT)
+    return float_file, quantize(float_file, folder / f"{NAME}.onnx", _feeds(data), KEEP_FLOAT)
 
 
 def _feeds(data: Path) -> Iterator[Feeds]:

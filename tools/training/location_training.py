@@ -65,9 +65,7 @@ class LocationSamples:
         house, k = self._rooms[self._order.pop()]
         scan = self._houses[house][k]
         if self._random.random() < JOINED:
-            near = [
-                neighbour for neighbour in self._houses[house] if neighbour is not scan and _adjacent(scan, neighbour)
-            ]
+            near = [neighbor for neighbor in self._houses[house] if neighbor is not scan and _adjacent(scan, neighbor)]
             if near:
                 scan = join(scan, near[int(self._random.integers(len(near)))])
         scan = add_mapping_errors(scan, self._random, missing=float(self._random.uniform(0, 0.35)))
@@ -101,7 +99,7 @@ def random_transform(scan: RoomScan, random: np.random.Generator) -> RoomScan:
 
 def birds_eye_sample(scan: RoomScan) -> tuple[U8, LocationTargets]:
     """The bird's-eye image of a scan, and boxes and masks of the locations of which enough was mapped."""
-    image, grid = birds_eye_image(scan.objects, span_of(scan), LocationConfig().band_high)
+    image, grid = birds_eye_image(scan.objects, span_of(scan), LocationConfig().band_high_share)
     seen = np.bincount([location for location in scan.location if location >= 0], minlength=len(scan.outlines))
     boxes, masks = [], []
     for outline in (xy for xy, count in zip(scan.outlines, seen, strict=True) if count >= MIN_OBJECTS):

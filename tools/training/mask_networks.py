@@ -82,8 +82,8 @@ class MaskDecoder(nn.Module):
         q = g // 4
         middle = depth[:, :, q : g - q, q : g - q]
         seen = (middle > 0).to(depth.dtype)
-        centre = (middle * seen).sum(dim=(2, 3), keepdim=True) / (seen.sum(dim=(2, 3), keepdim=True) + 1e-3)
-        relative = torch.clamp(depth - centre, -2.0, 2.0)
+        center = (middle * seen).sum(dim=(2, 3), keepdim=True) / (seen.sum(dim=(2, 3), keepdim=True) + 1e-3)
+        relative = torch.clamp(depth - center, -2.0, 2.0)
         inside = ((self.line >= 0) & (self.line <= 1)).to(depth.dtype)
         coarse_mask = (inside[None, :] * inside[:, None]).expand(boxes.shape[0], 1, g, g)
         # the size of the box gives the resolution of the grid

@@ -20,7 +20,7 @@ from placegraph.tools.training.detection_losses import tag_targets
 from placegraph.tools.training.detector_training import SIZES, read_refined
 from placegraph.tools.training.mask_networks import MaskEncoder
 from placegraph.tools.training.networks import DetectorExport, ObjectNetwork, TaggerNetwork
-from placegraph.tools.training.onnx_export import Feeds, export_onnx, image_feed, quantise
+from placegraph.tools.training.onnx_export import Feeds, export_onnx, image_feed, quantize
 from placegraph.tools.training.segmenter_training import SIZE as MASK_SIZE
 from placegraph.tools.training.segmenter_training import MaskNetwork
 from placegraph.tools.training.tagger_training import SIZE as TAG_SIZE
@@ -58,14 +58,14 @@ def package_networks(work: Path, calibration: Path) -> Iterator[str]:
 
 def _pack_detector(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
     views = _views(calibration, *SIZES[-1], squash=False)
-    yield from _quantise_and_list(
+    yield from _quantize_and_list(
         _export_detector(work, folder), folder, "house_detector", _detector_feeds(views), KEEP_FLOAT["detector"]
     )
 
 
 def _pack_tagger(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
     views = _views(calibration, TAG_SIZE, TAG_SIZE, squash=True)
-    yield from _quantise_and_list(
+    yield from _quantize_and_list(
         _export_tagger(work, folder), folder, "house_tagger", _tagger_feeds(views), KEEP_FLOAT["tagger"]
     )
     (folder / "house_tags.txt").write_text("".join(f"{name}\n" for name in NAMES))
@@ -76,10 +76,10 @@ def _pack_tagger(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
 def _pack_masks(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
     views = _views(calibration, *MASK_SIZE, squash=False)
     encoder, decoder = _export_masks(work, folder)
-    yield from _quantise_and_list(
+    yield from _quantize_and_list(
         encoder, folder, "house_mask_encoder", _encoder_feeds(views), KEEP_FLOAT["mask_encoder"]
     )
-    yield from _quantise_and_list(
+    yield from _quantize_and_list(
         decoder, folder, "house_mask_decoder", _decoder_feeds(work, views), KEEP_FLOAT["mask_decoder"]
     )
 
@@ -87,11 +87,11 @@ def _pack_masks(work: Path, calibration: Path, folder: Path) -> Iterator[str]:
 PARTS = {"refined.pt": _pack_detector, "tags.pt": _pack_tagger, "masks.pt": _pack_masks}
 
 
-def _quantise_and_list(
+def _quantize_and_list(
     float_file: Path, folder: Path, name: str, feeds: Iterator[Feeds], keep: tuple[str, ...]
 ) -> Iterator[str]:
-    quantised = quantise(float_file, folder / f"{name}.onnx", feeds, keep)
-    for file in (float_file, quantised):
+    quantized = quantize(float_file, folder / f"{name}.onnx", feeds, keep)
+    for file in (float_file, quantized):
         data = file.read_bytes()
         yield f"{file.relative_to(folder)}: size_bytes = {len(data)}, sha256 = {hashlib.sha256(data).hexdigest()}"
 

@@ -161,8 +161,8 @@ class BoxExport(nn.Module):
     def __init__(self, network: nn.Module, height: int, width: int) -> None:
         super().__init__()
         self.network = network
-        centres, strides = anchors(height, width)
-        self.register_buffer("centres", centres.T.contiguous()[None])
+        centers, strides = anchors(height, width)
+        self.register_buffer("centres", centers.T.contiguous()[None])  # spelled as in the packaged ONNX files
         self.register_buffer("strides", strides[None, None])
 
     def decode(self, distances: Tensor) -> Tensor:
@@ -209,12 +209,12 @@ class TaggerNetwork(nn.Module):
 
 def anchors(height: int, width: int) -> tuple[Tensor, Tensor]:
     """Cell centres (A, 2) x y in px and strides (A,) of an input size, by stride, row, column."""
-    centres, strides = [], []
+    centers, strides = [], []
     for stride in STRIDES:
         ys, xs = torch.meshgrid(torch.arange(height // stride), torch.arange(width // stride), indexing="ij")
-        centres.append((torch.stack((xs.flatten(), ys.flatten()), 1).float() + 0.5) * stride)
+        centers.append((torch.stack((xs.flatten(), ys.flatten()), 1).float() + 0.5) * stride)
         strides.append(torch.full((xs.numel(),), float(stride)))
-    return torch.cat(centres), torch.cat(strides)
+    return torch.cat(centers), torch.cat(strides)
 
 
 def upsample(x: Tensor) -> Tensor:

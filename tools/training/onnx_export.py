@@ -20,7 +20,7 @@ from placegraph.runtime.arrays import F32, U8
 
 OPSET = 17  # read by onnxruntime 1.20 and later
 # convolutions and data movement; the arithmetic of the last layers stays float
-QUANTISED = ("Conv", "Add", "Concat", "MaxPool", "Resize", "Relu")
+QUANTIZED = ("Conv", "Add", "Concat", "MaxPool", "Resize", "Relu")
 
 Feeds = dict[str, NDArray[Any]]
 
@@ -56,7 +56,7 @@ class _FeedReader(CalibrationDataReader):
         return next(self._feeds, None)
 
 
-def quantise(float_file: Path, file: Path, feeds: Iterator[Feeds], keep_float: Sequence[str] = ()) -> Path:
+def quantize(float_file: Path, file: Path, feeds: Iterator[Feeds], keep_float: Sequence[str] = ()) -> Path:
     """Writes `float_file` as static INT8 (QDQ, weights by channel) with ranges from `feeds`.
 
     keep_float: patterns of the names of nodes that stay float. Nodes that join numbers of different kinds (px and
@@ -74,7 +74,7 @@ def quantise(float_file: Path, file: Path, feeds: Iterator[Feeds], keep_float: S
             per_channel=True,
             activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,
-            op_types_to_quantize=list(QUANTISED),
+            op_types_to_quantize=list(QUANTIZED),
             nodes_to_exclude=[name for name in nodes if any(re.fullmatch(pattern, name) for pattern in keep_float)],
         )
     return file

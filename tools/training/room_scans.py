@@ -60,7 +60,7 @@ def add_mapping_errors(scan: RoomScan, random: np.random.Generator, missing: flo
     pairs = [
         (xyz, location) for xyz, location in zip(scan.objects, scan.location, strict=True) if random.random() >= missing
     ]
-    pairs = _merge_neighbours(pairs, random)
+    pairs = _merge_neighbors(pairs, random)
     mapped: list[tuple[F32, int]] = []
     for xyz, location in pairs:
         if random.random() < 0.06:
@@ -187,7 +187,7 @@ def _visible(xyz: F64, normal: F64, place: F64, heading: float, half_sector: flo
     return np.asarray(facing & near & (off < half_sector))
 
 
-def _merge_neighbours(pairs: list[tuple[F32, int]], random: np.random.Generator) -> list[tuple[F32, int]]:
+def _merge_neighbors(pairs: list[tuple[F32, int]], random: np.random.Generator) -> list[tuple[F32, int]]:
     """Some objects absorb their nearest neighbour when it is close."""
     pairs = list(pairs)
     k = 0

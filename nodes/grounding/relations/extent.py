@@ -30,7 +30,7 @@ def evaluate(query: RelationQuery) -> PairFits:
     if name in ("largest", "smallest"):
         volume = np.prod(boxes.size, axis=1)
         return PairFits(
-            sign * log_size(boxes, query.settings.appearance.short_side)[:, None],
+            sign * log_size(boxes, query.settings.appearance.short_side_weight)[:, None],
             lambda i, _: f"{boxes.labels[i]} fills a box of {volume[i]:.3f} m3",
             query.settings.nearness.margin_m,
         )

@@ -46,12 +46,12 @@ def under_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettin
     over = footprint_overlap(targets, anchors, gaps, smaller=True)
     rise = anchors.center[None, :, 2] - targets.center[:, None, 2]
     apart = anchors.low[None, :, 2] - targets.high[:, None, 2]  # negative: they overlap in height
-    lower = np.clip(0.5 + rise / (2 * settings.level_m), 0, 1)
+    lower = np.clip(0.5 + rise / (2 * settings.same_height_m), 0, 1)
     # without overlapping footprints it must be entirely lower: what stands beside a table is not under it
     aside = (
         0.8
         * decay(horizontal_distance_m(gaps), settings.half_aside_m)
-        * np.clip(0.5 + (apart + settings.level_m) / (2 * settings.level_m), 0, 1)
+        * np.clip(0.5 + (apart + settings.same_height_m) / (2 * settings.same_height_m), 0, 1)
     )
     below = lower * np.maximum(np.clip(over * 1.25, 0, 1), aside) * decay(apart, settings.half_rise_m)
     # a chair tucked under a desk is mostly before it, and its back rises above the desk's middle
@@ -67,8 +67,8 @@ def under_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettin
 def in_fit(targets: Boxes, anchors: Boxes, gaps: F64, settings: SupportSettings) -> F64:
     """(n, m) fit: most of the target's volume is within the anchor; for a room: the target belongs to it."""
     half = targets.size / 2
-    low = np.maximum((targets.center - half)[:, None], anchors.low[None] - settings.grown_m)
-    high = np.minimum((targets.center + half)[:, None], anchors.high[None] + settings.grown_m)
+    low = np.maximum((targets.center - half)[:, None], anchors.low[None] - settings.box_error_m)
+    high = np.minimum((targets.center + half)[:, None], anchors.high[None] + settings.box_error_m)
     share = np.prod(np.clip(high - low, 0, None), axis=2) / np.prod(2 * half, axis=1)[:, None]
     fit = np.clip(share * 0.5 / settings.inside_share, 0, 1)
     legs = np.array([label.head_noun in OPEN_BELOW for label in anchors.labels], bool)[None]

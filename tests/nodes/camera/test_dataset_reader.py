@@ -90,14 +90,14 @@ def test_intrinsics_must_be_positive_and_finite(values: tuple[float, ...]):
         reader.check_intrinsics(np.array(values), "here")
 
 
-@pytest.mark.parametrize("centre", [(50.0, 20.0), (25.0, 40.0), (640.0, 480.0)])
-def test_principal_point_outside_the_image_is_refused(centre: tuple[float, float]):
+@pytest.mark.parametrize("center", [(50.0, 20.0), (25.0, 40.0), (640.0, 480.0)])
+def test_principal_point_outside_the_image_is_refused(center: tuple[float, float]):
     with pytest.raises(SourceError, match=r"here: the principal point .* is outside the 50x40 image"):
-        reader.check_centre(np.array([40.0, 40.0, *centre]), (40, 50), "here")
+        reader.check_center(np.array([40.0, 40.0, *center]), (40, 50), "here")
 
 
 def test_principal_point_inside_is_accepted():
-    reader.check_centre(np.array([40.0, 40.0, 24.5, 19.5]), (40, 50), "here")
+    reader.check_center(np.array([40.0, 40.0, 24.5, 19.5]), (40, 50), "here")
 
 
 def test_no_pose_is_infinite_nan_or_zero(tmp_path: Path):

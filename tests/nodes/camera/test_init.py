@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from placegraph.nodes.camera import NODE, Camera, CameraConfig, detect_source, find_source
+from placegraph.nodes.camera import NODE, CameraConfig, CameraNode, detect_source, find_source
 from placegraph.runtime.errors import ConfigError, SourceError
 from placegraph.runtime.messages import End, Frame
 from placegraph.runtime.node import Context
 from placegraph.runtime.vision.geometry import backproject, transform
 
 
-def camera(**settings: object) -> Camera:
+def camera(**settings: object) -> CameraNode:
     return NODE(CameraConfig.model_validate(settings), Context())
 
 
-def drawn(**settings: object) -> Camera:
+def drawn(**settings: object) -> CameraNode:
     return camera(source="flat", settings={"width": 32, "height": 24, "frames": 3}, **settings)
 
 

@@ -110,7 +110,7 @@ def test_a_pose_with_one_lost_number_is_an_error(seven: Path):
         SOURCE(seven, {}).given_poses()
 
 
-def test_two_colour_images_of_one_frame(seven: Path):
+def test_two_color_images_of_one_frame(seven: Path):
     cv2.imwrite(str(seven / "frame-000001.color.jpg"), np.zeros((12, 16, 3), np.uint8))
     with pytest.raises(SourceError, match="frame 1 has a second file"):
         SOURCE(seven, {})

@@ -56,7 +56,7 @@ def test_one_keyframe_gives_a_cloud_and_no_object_yet(view):
 
 
 def test_maps_come_by_count_and_one_final(view):
-    maps = feed(make(map_every=2), circle(view, 5))
+    maps = feed(make(map_every_keyframes=2), circle(view, 5))
     assert [(m.revision, m.final, m.keyframes, m.frame_id) for m in maps] == [
         (0, False, 2, 3),
         (1, False, 4, 9),
@@ -67,11 +67,11 @@ def test_maps_come_by_count_and_one_final(view):
 @pytest.mark.parametrize("when", ["first", "before the last segments", "at the end"])
 def test_the_order_of_messages_does_not_change_the_maps(view, when):
     views = circle(view, 4)
-    expected = [encode(m) for m in feed(make(map_every=2), views)]
+    expected = [encode(m) for m in feed(make(map_every_keyframes=2), views)]
     messages = [message for pair in views for message in reversed(pair)]  # segments before their keyframe
     position = {"first": 0, "before the last segments": 7, "at the end": 8}[when]
     messages.insert(position, last(9, 4))
-    node = make(map_every=2)
+    node = make(map_every_keyframes=2)
     assert [encode(m) for message in messages for m in node.step(message)] == expected
 
 
@@ -91,7 +91,7 @@ def test_a_pose_that_is_not_finite_is_refused_with_its_frame(view):
         node.step(segments)
 
 
-@pytest.mark.parametrize("settings", [{"map_every": 0}, {"voxel_m": -1.0}, {"voxels": 1}])
+@pytest.mark.parametrize("settings", [{"map_every_keyframes": 0}, {"voxel_m": -1.0}, {"voxels": 1}])
 def test_wrong_settings_are_refused(settings):
     with pytest.raises(ValidationError):
         make(**settings)
@@ -150,7 +150,9 @@ def test_objects_that_their_views_doubt_are_not_in_the_map(view):
 
 
 def test_a_correction_of_a_keyframe_whose_segments_were_lost_is_applied(view):
-    node = NODE(NODE.config_type(map_every=1, submap={"keyframes": 1}), Context(produced_kinds=("Correction",)))
+    node = NODE(
+        NODE.config_type(map_every_keyframes=1, submap={"keyframes": 1}), Context(produced_kinds=("Correction",))
+    )
     first, lost, third = circle(view, 3)
     moved = first[0].world_from_camera.copy()
     moved[0, 3] += 0.5

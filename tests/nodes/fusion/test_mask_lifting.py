@@ -71,7 +71,7 @@ def test_what_lies_on_a_thing_is_cut_out_of_its_mask():
     assert not cut[4:9, 10:15].any() and cut.sum() == 600 - 25
 
 
-def test_a_neighbour_that_only_overlaps_is_not_cut_out():
+def test_a_neighbor_that_only_overlaps_is_not_cut_out():
     boxes = np.array([[0, 0, 30, 20], [28, 0, 33, 5]], np.int32)
     cut, _ = exclusive_masks(boxes, [np.ones((20, 30), bool), np.ones((5, 5), bool)], 0.8)
     assert cut.all()

@@ -220,7 +220,7 @@ def test_a_chair_that_was_pushed_by_less_than_its_size_is_still_one_chair(view):
     assert left.mean() < 0.02
 
 
-def test_what_is_hidden_or_not_recognised_for_a_while_stays(view):
+def test_what_is_hidden_or_not_recognized_for_a_while_stays(view):
     screen = {**SCENE, "screen": ("", (0.2, -1.0, 0.0), (1.8, -0.95, 1.4))}
     unnamed = {**ROOM, "chair": ("", *CHAIR[1:]), "pole": ("", *ROOM["pole"][1:])}
     views = [

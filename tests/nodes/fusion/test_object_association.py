@@ -138,7 +138,7 @@ def test_a_second_mask_of_one_view_is_no_further_observation(objects):
     assert couch.observations == 1 and couch.votes == {"couch": 1.0}
 
 
-def test_comparisons_grow_with_neighbours_and_not_with_all_objects(monkeypatch):
+def test_comparisons_grow_with_neighbors_and_not_with_all_objects(monkeypatch):
     objects = ObjectMap(encode, VoxelContext(0.025), AssociationConfig(prune_after=1000))
     calls = 0
     shares = ObjectMap._overlap_shares

@@ -11,19 +11,19 @@ from placegraph.runtime.scene_graph import GraphNode, SceneGraph
 SETTINGS = AppearanceSettings()
 
 
-def test_unseen_colour_neither_fits_nor_fails(thing_of):
+def test_unseen_color_neither_fits_nor_fails(thing_of):
     assert color_fit(thing_of(0, "R0", "cup", (0, 0, 0), (1, 1, 1)), "red", SETTINGS) == 0.5
 
 
 @pytest.mark.parametrize("name", sorted(BASIC_COLORS))
-def test_each_colour_is_called_by_its_name(thing_of, name):
+def test_each_color_is_called_by_its_name(thing_of, name):
     node = thing_of(0, "R0", "cup", (0, 0, 0), (1, 1, 1), BASIC_COLORS[name])
     fits = {other: color_fit(node, other, SETTINGS) for other in BASIC_COLORS}
     assert max(fits, key=fits.get) == name
     assert sorted(fits.values())[-2] < 0.75
 
 
-def test_a_tag_that_says_the_colour_wins(thing_of):
+def test_a_tag_that_says_the_color_wins(thing_of):
     assert color_fit(thing_of(0, "R0", "red cup", (0, 0, 0), (1, 1, 1), (0, 0, 255)), "red", SETTINGS) == 1
 
 

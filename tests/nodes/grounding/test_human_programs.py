@@ -29,7 +29,7 @@ def follow_each_other(span: str, words: tuple[str, ...]) -> bool:
     return any(words[i : i + len(wanted)] == wanted for i in range(len(words)))
 
 
-def test_every_fourth_request_is_labelled_once():
+def test_every_fourth_request_is_labeled_once():
     assert [label["line"] for label in LABELS] == list(range(0, 400, 4))
 
 

@@ -15,14 +15,15 @@ def test_nothing_is_like_nothing(names):
 
 @pytest.mark.parametrize(
     ("noun", "tag", "score"),
-    [("chairs", "Chair", N.same), ("chair", "office chair", N.kind), ("couch", "sofa", N.synonym),
-     ("mug", "cup", N.synonym),
-     ("wooden chair", "chair", N.head), ("chair", "zebra", 0),
-     ("duffel bag", "bag", N.synonym + N.shared_word_bonus), ("duffel bag", "backpack", N.synonym),
-     ("trashcan", "trash can", N.same),
-     ("dry erase board", "whiteboard", N.synonym), ("seats", "armchair", N.member),
-     ("bookshlef", "bookshelf", N.misspelled),
-     ("angel staute", "statue", N.head * N.misspelled), ("leather couch", "sofa", N.head * N.synonym),
+    [("chairs", "Chair", N.same_words_fit), ("chair", "office chair", N.head_noun_fit),
+     ("couch", "sofa", N.synonym_fit), ("mug", "cup", N.synonym_fit),
+     ("wooden chair", "chair", N.other_modifier_fit), ("chair", "zebra", 0),
+     ("duffel bag", "bag", N.synonym_fit + N.shared_word_bonus), ("duffel bag", "backpack", N.synonym_fit),
+     ("trashcan", "trash can", N.same_words_fit),
+     ("dry erase board", "whiteboard", N.synonym_fit), ("seats", "armchair", N.superclass_fit),
+     ("bookshlef", "bookshelf", N.misspelled_fit),
+     ("angel staute", "statue", N.other_modifier_fit * N.misspelled_fit),
+     ("leather couch", "sofa", N.other_modifier_fit * N.synonym_fit),
      ("mug", "rug", 0), ("glass", "window", 0),
      ("table", "tablecloth", 0)],
 )  # fmt: skip

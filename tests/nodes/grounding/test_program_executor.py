@@ -70,7 +70,7 @@ def office(request):
         ("monitor; is burnt; near (phone)", "O8"),
     ],
 )  # fmt: skip
-def test_a_room_without_rooms_colours_and_viewer(office, names, program, expected):
+def test_a_room_without_rooms_colors_and_viewer(office, names, program, expected):
     assert best(office, names, program) == expected
 
 

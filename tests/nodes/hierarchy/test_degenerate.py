@@ -54,7 +54,7 @@ def depth_of(boxes, world_from_camera):
 def mapped(boxes, poses, turn=STILL, map_every=1000):
     """The last graph of frames of these boxes; `turn` moves the world that the poses are told in."""
     fusion, hierarchy = (
-        FUSION(FUSION.config_type(stride=1, map_every=map_every), Context()),
+        FUSION(FUSION.config_type(stride=1, map_every_keyframes=map_every), Context()),
         HIERARCHY(HIERARCHY.config_type(), Context()),
     )
     graphs = []

@@ -74,6 +74,14 @@ def test_rooms_are_named_by_what_they_hold_without_the_model(message_of, house, 
         assert sum(weights) == pytest.approx(1, abs=0.002)
 
 
+def test_a_node_that_was_started_again_gives_the_same_graph(message_of, house, graph_of):
+    assert NODE.restartable
+    node = make()
+    node.step(message_of(graph_of({"B0": "", "F0": "B0", "R0": "F0"}, {"R0": ["bed", "lamp"]})))
+    message = message_of(house, revision=2)
+    assert node.step(message)[0].json == make().step(message)[0].json
+
+
 def test_nothing_but_tags_of_places_changes(message_of, house):
     (named_graph,) = make().step(message_of(house))
     before, after = json.loads(house.to_json()), json.loads(named_graph.json)

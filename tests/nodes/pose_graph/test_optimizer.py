@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from placegraph.nodes.pose_graph.optimizer import Edge, UpMeasurement, optimise
+from placegraph.nodes.pose_graph.optimizer import Edge, UpMeasurement, optimize
 from placegraph.runtime.vision.geometry import inverse
 from placegraph.runtime.vision.registration import exponential
 
@@ -26,19 +26,19 @@ DRIFT = np.array([0.01, 0.004, 0.002, 0.0, 0.002, 0.01])
 
 
 def test_nothing_to_do() -> None:
-    assert len(optimise(np.zeros((0, 4, 4)), [], [])) == 0
-    assert np.array_equal(optimise(np.eye(4)[None], [], []), np.eye(4)[None])
+    assert len(optimize(np.zeros((0, 4, 4)), [], [])) == 0
+    assert np.array_equal(optimize(np.eye(4)[None], [], []), np.eye(4)[None])
 
 
 def test_without_loops_the_poses_stay() -> None:
     _, poses, edges = ring(12, DRIFT)
-    assert np.allclose(optimise(poses, edges, []), poses, atol=1e-9)
+    assert np.allclose(optimize(poses, edges, []), poses, atol=1e-9)
 
 
 def test_a_loop_spreads_the_drift() -> None:
     true, poses, edges = ring(30, DRIFT)
     loop = Edge(0, 29, inverse(true[0]) @ true[29], 0.01, 0.01, True)
-    found = optimise(poses, [*edges, loop], [], iterations=30)
+    found = optimize(poses, [*edges, loop], [], iterations=30)
     assert worst_m(found, true) < 0.4 * worst_m(poses, true)
     assert worst_m(found[29:], true[29:]) < 0.02  # where the loop is closed
     assert np.array_equal(found[0], true[0])
@@ -48,7 +48,7 @@ def test_one_wrong_loop_among_right_ones_is_outvoted() -> None:
     true, poses, edges = ring(30, DRIFT)
     right = [Edge(i, i + 15, inverse(true[i]) @ true[i + 15], 0.01, 0.01, True) for i in range(15)]
     wrong = Edge(3, 20, exponential(np.array([2.0, 1, 0, 0, 0, 1])), 0.01, 0.01, True)
-    found = optimise(poses, [*edges, *right, wrong], [], iterations=30)
+    found = optimize(poses, [*edges, *right, wrong], [], iterations=30)
     assert worst_m(found, true) < 0.15
 
 
@@ -56,7 +56,7 @@ def test_one_wrong_loop_among_right_ones_is_outvoted() -> None:
 def test_levels_take_the_tilt_away(count: int) -> None:
     true, poses, edges = ring(count, np.array([0, 0, 0, 0.01, -0.01, 0.0]))
     levels = [UpMeasurement(i, true[i][2, :3], 0.01) for i in range(count)]
-    found = optimise(poses, edges, levels, iterations=20)
+    found = optimize(poses, edges, levels, iterations=20)
     assert np.abs(found[:, 2, :3] - true[:, 2, :3]).max() < max(
         0.3 * np.abs(poses[:, 2, :3] - true[:, 2, :3]).max(), 0.006
     )

@@ -26,7 +26,7 @@ def test_names_are_strongest_first_or_weighted() -> None:
     assert read(tags=[]).all_tags == ()
 
 
-def test_a_colour_is_a_triple_or_a_word() -> None:
+def test_a_color_is_a_triple_or_a_word() -> None:
     assert read(color=[255, 0, 12.4]).color == (255, 0, 12) and read(color=[0, 1, 1]).color == (0, 1, 1)
     assert read(color="Grey").all_tags == (Tag("chair", 1.0), Tag("gray chair", 0.5))
     assert read(color="light blue", tags=[]).all_tags == (Tag("light blue object", 0.5),)

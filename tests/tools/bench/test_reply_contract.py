@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from placegraph.nodes.grounding import Grounding
+from placegraph.nodes.grounding import GroundingNode
 from placegraph.runtime.messages import Answer, Question
 from placegraph.tools.bench.reply_contract import fuzz
 
@@ -40,7 +40,7 @@ def test_the_language_model_keeps_it_too() -> None:
     ],
 )
 def test_a_broken_reply_is_a_fault(monkeypatch, change, fault) -> None:
-    step = Grounding.step
+    step = GroundingNode.step
 
     def broken(self, message):
         given = step(self, message)
@@ -54,7 +54,7 @@ def test_a_broken_reply_is_a_fault(monkeypatch, change, fault) -> None:
         answer = Answer(frame_id=-1, stamp_ns=0, question_id=message.question_id, json=json.dumps(fields))
         return [answer]
 
-    monkeypatch.setattr(Grounding, "step", broken)
+    monkeypatch.setattr(GroundingNode, "step", broken)
     outcome = fuzz(12, mode="rules", seed=0, floors=1, settings=FAST)
     assert outcome.faults
     assert all(re.search(fault, found) for found in outcome.faults)

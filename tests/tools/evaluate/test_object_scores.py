@@ -59,7 +59,7 @@ def test_the_overlap_decides() -> None:
     assert scores([("sofa", box(0.3))], [("sofa", box(0))])["recall_50"] == 1
 
 
-def test_only_a_thin_true_object_is_found_by_its_centre() -> None:
+def test_only_a_thin_true_object_is_found_by_its_center() -> None:
     flat, deep = (1.0, 0.04, 1.0), (1.0, 0.4, 1.0)
     beside = [("picture", box(0, flat, y=0.2))]
     assert scores(beside, [("picture", box(0, flat))])["recall"] == 1
@@ -94,7 +94,7 @@ def test_what_was_never_seen_excuses_nothing() -> None:
     assert (found["precision"], found["aside"]) == (0, 0) and np.isnan(found["recall"])
 
 
-def test_a_poorly_seen_neighbour_takes_no_map_object_from_one_seen_well() -> None:
+def test_a_poorly_seen_neighbor_takes_no_map_object_from_one_seen_well() -> None:
     found = scores([("chair", box(0.3))], [("chair", box(0)), ("chair", box(0.3))], poor={1})
     assert (found["recall"], found["precision"], found["aside"]) == (1, 1, 0)
 

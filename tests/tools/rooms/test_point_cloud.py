@@ -48,7 +48,7 @@ def areas(floors: list) -> list[list[float]]:
 
 
 def heights(floors: list) -> list[list[float]]:
-    return [[floor.span.low, floor.span.high] for floor in floors]
+    return [[floor.span.low_m, floor.span.high_m] for floor in floors]
 
 
 @pytest.mark.parametrize("ceiling", [True, False])
@@ -68,7 +68,7 @@ def test_neither_foundations_nor_a_roof_nor_tables_are_floors() -> None:
     slabs = [sheet((0, 8), (0, 4), (z, z)) for z in (-0.3, 2.8)]
     floors = floors_of_cloud(np.concatenate(storey(0.0) + slabs), 0.05)
     np.testing.assert_allclose(heights(floors), [[0, 2.5]], atol=0.35)  # the roof may be taken for the ceiling
-    assert floors[0].span.low == pytest.approx(0, abs=0.05)
+    assert floors[0].span.low_m == pytest.approx(0, abs=0.05)
 
 
 def test_the_order_of_the_points_changes_nothing() -> None:
@@ -94,7 +94,7 @@ def test_the_order_of_the_points_changes_nothing() -> None:
 def test_odd_clouds_have_one_floor_with_a_room(points: np.ndarray) -> None:
     floors = floors_of_cloud(points, 0.05)
     assert len(floors) == 1 and len(floors[0].rooms) >= 1
-    assert np.isfinite(heights(floors)).all() and floors[0].span.low <= floors[0].span.high
+    assert np.isfinite(heights(floors)).all() and floors[0].span.low_m <= floors[0].span.high_m
 
 
 def test_people_stand_on_floors_only() -> None:

@@ -46,7 +46,7 @@ def test_equal_seeds_give_equal_items_and_others_differ(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(designs()))
-def test_given_sizes_are_honoured(name: str) -> None:
+def test_given_sizes_are_honored(name: str) -> None:
     low, high = design(name, np.random.default_rng(7)).extent
     want = (high - low) * 1.1
     item = design(name, np.random.default_rng(8), width_m=want[0], depth_m=want[1], height_m=want[2])

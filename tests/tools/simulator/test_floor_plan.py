@@ -65,7 +65,7 @@ def test_a_negative_seed_is_refused() -> None:
 
 
 @pytest.mark.parametrize("floors", [1, 2, 3])
-def test_the_number_of_floors_is_honoured_and_each_flight_leads_one_up(floors: int) -> None:
+def test_the_number_of_floors_is_honored_and_each_flight_leads_one_up(floors: int) -> None:
     house = _house(20, floors)
     assert [floor.index for floor in house.floors] == list(range(floors))
     assert [stairs.floor for stairs in house.stairs] == list(range(floors - 1))

@@ -30,7 +30,7 @@ def test_a_folded_network_is_the_same_function():
         network(image, text)  # moves the running statistics off their start
         wanted = network.eval()(image, text)
         words = network.words
-        fold_batch_norm(network).eval().words = words  # its table is near them, and test_words.py's
+        fold_batch_norm(network).eval().words = words  # its table is near them, and those of test_word_projection.py
         found = network(image, text)
     for one, other in zip(found, wanted, strict=True):
         torch.testing.assert_close(one, other, atol=1e-4, rtol=1e-4)

@@ -22,23 +22,23 @@ from placegraph.tools.training.networks import anchors  # noqa: E402
 
 torch.set_num_threads(1)
 SIZE = 64
-CENTRES, STRIDES = anchors(SIZE, SIZE)
-COUNT = len(CENTRES)
+CENTERS, STRIDES = anchors(SIZE, SIZE)
+COUNT = len(CENTERS)
 WORDS = 5
 
 
 def around(boxes):
     """What all anchors find (A, 4): the box around them of `boxes`, else one stride to each side."""
-    found = torch.cat((CENTRES - STRIDES[:, None], CENTRES + STRIDES[:, None]), 1)
+    found = torch.cat((CENTERS - STRIDES[:, None], CENTERS + STRIDES[:, None]), 1)
     for box in boxes:
-        inside = (box[:2] < CENTRES).all(1) & (box[2:] > CENTRES).all(1)
+        inside = (box[:2] < CENTERS).all(1) & (box[2:] > CENTERS).all(1)
         found[inside] = box
     return found
 
 
 def raw(found):
     """Raw distances (1, 4, A) that decode to boxes (A, 4) around their anchors."""
-    reach = torch.cat((CENTRES - found[:, :2], found[:, 2:] - CENTRES), 1) / STRIDES[:, None]
+    reach = torch.cat((CENTERS - found[:, :2], found[:, 2:] - CENTERS), 1) / STRIDES[:, None]
     return torch.log(torch.expm1(reach.clamp(min=1e-3))).T[None].contiguous()
 
 
@@ -67,10 +67,10 @@ def outputs(found=None, logit=-3.0):
 @pytest.mark.parametrize("size", [0.5, 2.0])
 def test_a_box_smaller_than_a_cell_has_anchors_near_it(x, y, size):
     box = torch.tensor([[x, y, x + size, y + size]])
-    owner, quality = assign_anchors(around([]), torch.full((WORDS, COUNT), 0.1), box, torch.tensor([2]), CENTRES)
+    owner, quality = assign_anchors(around([]), torch.full((WORDS, COUNT), 0.1), box, torch.tensor([2]), CENTERS)
     mine = torch.nonzero(owner == 0)[:, 0]
     assert 1 <= len(mine) <= 10
-    off = (CENTRES[mine] - box[0, :2] - size / 2).norm(dim=1)
+    off = (CENTERS[mine] - box[0, :2] - size / 2).norm(dim=1)
     assert off.max() < 20
     assert torch.isfinite(quality).all() and quality[mine].max() > 0
 
@@ -79,28 +79,28 @@ def test_tiny_boxes_of_one_picture_all_have_an_anchor():
     low = torch.tensor([[3.0, 3], [20, 8], [40, 8], [8, 40], [31, 31], [61, 61]])
     boxes = torch.cat((low, low + 2), 1)
     owner, _ = assign_anchors(
-        around([]), torch.full((WORDS, COUNT), 0.1), boxes, torch.zeros(6, dtype=torch.long), CENTRES
+        around([]), torch.full((WORDS, COUNT), 0.1), boxes, torch.zeros(6, dtype=torch.long), CENTERS
     )
     assert set(owner.tolist()) == {-1, 0, 1, 2, 3, 4, 5}
 
 
 def test_anchors_outside_answer_for_nothing():
     box = torch.tensor([[16.0, 16, 40, 48]])
-    owner, quality = assign_anchors(around(box), torch.full((WORDS, COUNT), 0.5), box, torch.tensor([0]), CENTRES)
+    owner, quality = assign_anchors(around(box), torch.full((WORDS, COUNT), 0.5), box, torch.tensor([0]), CENTERS)
     mine = owner >= 0
     assert mine.sum() == 10  # of the 12 + 2 + 0 inside
-    assert ((CENTRES[mine] > box[0, :2]) & (CENTRES[mine] < box[0, 2:])).all()
+    assert ((CENTERS[mine] > box[0, :2]) & (CENTERS[mine] < box[0, 2:])).all()
     torch.testing.assert_close(quality[mine].max(), torch.tensor(1.0), atol=1e-3, rtol=0)
     assert (quality[~mine] == 0).all()
 
 
 def test_a_contested_anchor_goes_to_the_box_of_higher_iou():
     boxes = torch.tensor([[0.0, 0, 40, 40], [14, 14, 54, 54]])
-    shared = (boxes[1, :2] < CENTRES).all(1) & (boxes[0, 2:] > CENTRES).all(1)
+    shared = (boxes[1, :2] < CENTERS).all(1) & (boxes[0, 2:] > CENTERS).all(1)
     found = around([])
     steps = torch.linspace(0.5, 13.5, int(shared.sum()))  # from near the first to near the second
     found[shared] = boxes[0] + steps[:, None]
-    owner, _ = assign_anchors(found, torch.full((WORDS, COUNT), 0.5), boxes, torch.tensor([1, 1]), CENTRES)
+    owner, _ = assign_anchors(found, torch.full((WORDS, COUNT), 0.5), boxes, torch.tensor([1, 1]), CENTERS)
     assert shared.sum() == 11  # each box asks for ten of them
     assert owner[shared].tolist() == iou(boxes, found[shared]).argmax(0).tolist()
     assert set(owner[shared].tolist()) == {0, 1}
@@ -112,14 +112,14 @@ def test_an_anchor_that_scores_the_word_is_preferred():
     wanted = torch.arange(20, 30)
     scores[3, wanted] = 0.9
     scores[2, 40:50] = 0.9  # another word
-    owner, _ = assign_anchors(around(box), scores, box, torch.tensor([3]), CENTRES)
+    owner, _ = assign_anchors(around(box), scores, box, torch.tensor([3]), CENTERS)
     assert torch.nonzero(owner == 0)[:, 0].tolist() == wanted.tolist()
 
 
 def perfect(boxes, prompts, cells):
     """Outputs that answer exactly for the anchors that are assigned, and exactly no elsewhere."""
     found = around(boxes)
-    owner, _ = assign_anchors(found, torch.full((WORDS, COUNT), 0.5), boxes, torch.tensor(prompts), CENTRES)
+    owner, _ = assign_anchors(found, torch.full((WORDS, COUNT), 0.5), boxes, torch.tensor(prompts), CENTERS)
     logits = torch.full((1, WORDS, COUNT), -15.0)
     mine = owner >= 0
     logits[0, torch.tensor(prompts)[owner[mine]], mine] = 15.0
@@ -177,8 +177,8 @@ def test_a_word_is_pushed_down_where_nothing_shows_it():
 def test_an_ignored_object_does_not_push_its_word_down():
     box = [16.0, 16, 48, 48]
     grad = class_gradient(targets([box], [2], [False]))
-    inside = ((CENTRES > 16) & (CENTRES < 48)).all(1)
-    far = ((CENTRES < 4) | (CENTRES > 60)).any(1)
+    inside = ((CENTERS > 16) & (CENTERS < 48)).all(1)
+    far = ((CENTERS < 4) | (CENTERS > 60)).any(1)
     assert inside.sum() > 15 and (grad[2, inside] == 0).all()
     assert (grad[2, far] > 0).all()
     assert (grad[[0, 1, 3, 4]] > 0).all()  # only its own word is spared
@@ -188,7 +188,7 @@ def test_an_ignored_object_keeps_its_word_where_another_object_is_found():
     """A cup too small to count before a table: the table's anchors must not say `no cup` either."""
     table, cup = [8.0, 8, 56, 56], [24.0, 24, 40, 40]
     grad = class_gradient(targets([table, cup], [1, 2], [True, False]))
-    inside = ((CENTRES > 24) & (CENTRES < 40)).all(1)
+    inside = ((CENTERS > 24) & (CENTERS < 40)).all(1)
     assert (grad[1, inside] != 0).all()
     assert (grad[2, inside] == 0).all()
 
@@ -238,7 +238,7 @@ def test_descending_the_losses_finds_the_boxes():
         sum(losses(out, want, SIZE, SIZE).values()).backward()
         optimizer.step()
     reach = torch.nn.functional.softplus(out[0][0]).T * STRIDES[:, None]
-    found = torch.cat((CENTRES - reach[:, :2], CENTRES + reach[:, 2:]), 1)
+    found = torch.cat((CENTERS - reach[:, :2], CENTERS + reach[:, 2:]), 1)
     scores = torch.sigmoid(out[1][0])
     overlap = iou(boxes, found)
     for k, prompt in enumerate(prompts):

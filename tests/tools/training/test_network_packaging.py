@@ -28,7 +28,7 @@ from placegraph.tools.training.networks import ObjectNetwork, TaggerNetwork  # n
 from placegraph.tools.training.segmenter_training import MaskNetwork  # noqa: E402
 from placegraph.tools.training.view_rendering import visible_boxes  # noqa: E402
 
-# the exporter is the older one on purpose, see export.py
+# the exporter is the older one on purpose, see onnx_export.py
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::UserWarning")
 torch.set_num_threads(1)
 NETWORKS = ("house_detector", "house_tagger", "house_mask_encoder", "house_mask_decoder")
@@ -57,13 +57,13 @@ def write_checkpoints(work):
 
 @pytest.fixture(scope="module")
 def packed(tmp_path_factory):
-    """Folder, lines said and feeds by network; quantising, tested in test_export.py, only copies here."""
+    """Folder, lines said and feeds by network; quantising, tested in test_onnx_export.py, only copies here."""
     folder = tmp_path_factory.mktemp("pack")
     write_shard(folder / "calibration" / "10000")
     write_checkpoints(folder / "work")
     feeds, kept = {}, {}
 
-    def quantise(float_file, file, given, keep):
+    def quantize(float_file, file, given, keep):
         feeds[file.stem], kept[file.stem] = list(given), keep
         shutil.copy(float_file, file)
         return file
@@ -73,7 +73,7 @@ def packed(tmp_path_factory):
         patch.setattr(pack_module, "MASK_SIZE", (64, 64))
         patch.setattr(pack_module, "TAG_SIZE", 64)
         patch.setattr(pack_module, "CALIBRATION_VIEWS", 4)
-        patch.setattr(pack_module, "quantise", quantise)
+        patch.setattr(pack_module, "quantize", quantize)
         lines = list(package_networks(folder / "work", folder / "calibration"))
     return folder / "work" / "onnx", lines, feeds, kept
 
@@ -84,7 +84,7 @@ def test_what_is_trained_is_packed_alone(packed, tmp_path, monkeypatch):
     folder, _, _, _ = packed
     shutil.copy(folder.parent / "refined.pt", tmp_path)
     monkeypatch.setattr(pack_module, "SIZES", ((64, 64),))
-    monkeypatch.setattr(pack_module, "quantise", lambda float_file, file, feeds, keep: shutil.copy(float_file, file))
+    monkeypatch.setattr(pack_module, "quantize", lambda float_file, file, feeds, keep: shutil.copy(float_file, file))
     lines = list(package_networks(tmp_path, folder.parent.parent / "calibration"))
     assert [line.split(":")[0] for line in lines] == ["float/house_detector.onnx", "house_detector.onnx"]
 

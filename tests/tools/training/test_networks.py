@@ -25,10 +25,10 @@ def network():
 
 
 def test_anchors_are_cell_middles_by_stride_row_column():
-    centres, strides = anchors(64, 96)
+    centers, strides = anchors(64, 96)
     assert [int((strides == s).sum()) for s in STRIDES] == [96, 24, 6]
-    assert centres[:2].tolist() == [[4, 4], [12, 4]] and centres[12].tolist() == [4, 12]
-    assert centres[96].tolist() == [8, 8] and centres[-1].tolist() == [80, 48]
+    assert centers[:2].tolist() == [[4, 4], [12, 4]] and centers[12].tolist() == [4, 12]
+    assert centers[96].tolist() == [8, 8] and centers[-1].tolist() == [80, 48]
     assert strides.tolist() == sorted(strides.tolist())
 
 
@@ -55,10 +55,10 @@ def test_cells_and_anchors_have_the_same_order(network):
         marked = plain.clone()
         marked[:, :, 80:104, 144:168] = torch.rand(3, 24, 24)
         change = (network(marked, text)[0] - network(plain, text)[0]).abs().sum(1)[0]
-    centres, strides = anchors(128, 192)
+    centers, strides = anchors(128, 192)
     for stride in STRIDES[:2]:
         here = strides == stride
-        strongest = centres[here][change[here].argmax()]
+        strongest = centers[here][change[here].argmax()]
         assert (strongest - torch.tensor([156.0, 92.0])).norm() < 2.5 * stride
 
 
@@ -116,7 +116,7 @@ def test_detector_takes_any_number_of_words(network):
             assert (found[:, 2:4] > 0).all() and (found[:, 4:] >= 0).all() and (found[:, 4:] <= 1).all()
 
 
-def test_tagger_undoes_the_normalisation_and_pools_cells_and_anchors(network):
+def test_tagger_undoes_the_normalization_and_pools_cells_and_anchors(network):
     text = torch.randn(5, 256)
     tagger = TaggerNetwork(network, text).eval()
     image = torch.rand(2, 3, 64, 64)

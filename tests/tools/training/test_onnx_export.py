@@ -10,9 +10,9 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs the extra `train`")
 
 from placegraph.tools.training.networks import Conv, Csp  # noqa: E402
-from placegraph.tools.training.onnx_export import export_onnx, image_feed, quantise  # noqa: E402
+from placegraph.tools.training.onnx_export import export_onnx, image_feed, quantize  # noqa: E402
 
-# the exporter is the older one on purpose, see export.py
+# the exporter is the older one on purpose, see onnx_export.py
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::UserWarning")
 torch.set_num_threads(1)
 
@@ -98,7 +98,7 @@ def test_names_and_shapes_are_those_asked_for(float_file):
 
 
 def test_int8_is_smaller_and_near(network, float_file, tmp_path):
-    file = quantise(float_file, tmp_path / "small.onnx", feeds(1, 8))
+    file = quantize(float_file, tmp_path / "small.onnx", feeds(1, 8))
     assert file.stat().st_size < 0.6 * float_file.stat().st_size
     assert conv_weights_in_float(file) == []
     for feed in feeds(2, 3, words=4):
@@ -109,10 +109,10 @@ def test_int8_is_smaller_and_near(network, float_file, tmp_path):
 
 def test_what_is_kept_float_stays_float(float_file, tmp_path):
     (last,) = [node.name for node in onnx.load(float_file).graph.node if "/last/" in node.name]
-    file = quantise(float_file, tmp_path / "small.onnx", feeds(1, 4), keep_float=("/last/.*",))
+    file = quantize(float_file, tmp_path / "small.onnx", feeds(1, 4), keep_float=("/last/.*",))
     assert conv_weights_in_float(file) == [last]
 
 
 def test_equal_feeds_give_equal_files(float_file, tmp_path):
-    one, same = (quantise(float_file, tmp_path / name, feeds(1, 3)) for name in ("a.onnx", "b.onnx"))
+    one, same = (quantize(float_file, tmp_path / name, feeds(1, 3)) for name in ("a.onnx", "b.onnx"))
     assert one.read_bytes() == same.read_bytes()
