@@ -83,7 +83,6 @@ CONDITIONS: dict[str, ConditionForm] = {
     "floor": ConditionForm("place", (0, 0), "on a floor of the building, as said: upstairs, second floor", True),
     "for": ConditionForm("purpose", (0, 0), "what the thing is used for, as said: sit on", True),
 }
-RANKS = tuple(name for name, form in CONDITIONS.items() if form.kind == "rank")
 
 
 class _Model(BaseModel):
